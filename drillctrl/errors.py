@@ -1,0 +1,98 @@
+"""The one exception that bad input raises, and the checks that raise it."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from typing import Any
+
+
+class InputError(ValueError):
+    """Input outside what is permitted.
+
+    Parameters
+    ----------
+    parameter : str
+        Name of the offending parameter, as the user typed or called it.
+    value : object
+        The value that was given.
+    permitted : str
+        What would have been accepted, as the end of "must be ...".
+
+    Notes
+    -----
+    The message is a single line that names all three.
+    """
+
+    def __init__(self, parameter: str, value: object, permitted: str) -> None:
+        shown = value if isinstance(value, str) else repr(value)
+        super().__init__(" ".join(f"{parameter} = {shown}: must be {permitted}".split()))
+        self.parameter = parameter
+        self.value = value
+        self.permitted = permitted
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.parameter, self.value, self.permitted)
+
+
+def interval_text(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False) -> str:
+    """Say an interval in words that follow "must be"."""
+    if low == -math.inf and high == math.inf:
+        return "a finite number"
+    left = "(" if open_low or low == -math.inf else "["
+    right = ")" if high == math.inf else "]"
+    return f"a finite number in {left}{low:g}, {high:g}{right}"
+
+
+def checked_number(
+    parameter: str,
+    value: object,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    open_low: bool = False,
+) -> float:
+    """Return ``value`` as a float, or raise if it is no finite number in the interval.
+
+    Parameters
+    ----------
+    parameter : str
+        Name for the message.
+    value : object
+        Anything; booleans and strings are refused.
+    low, high : float
+        The closed interval of permitted values.
+    open_low : bool
+        Exclude ``low`` itself.
+
+    Raises
+    ------
+    InputError
+        If ``value`` is not a finite real number in the interval.
+    """
+    permitted = interval_text(low, high, open_low=open_low)
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise InputError(parameter, value, permitted)
+    number = float(value)
+    if not math.isfinite(number) or number < low or number > high:
+        raise InputError(parameter, number, permitted)
+    if open_low and number == low:
+        raise InputError(parameter, number, permitted)
+    return number
+
+
+def checked_integer(parameter: str, value: object, low: int, high: int) -> int:
+    """Return ``value`` as an int, or raise if it is no whole number in ``[low, high]``.
+
+    Raises
+    ------
+    InputError
+        If ``value`` is not an integer in the interval; 4.0 counts as 4.
+    """
+    permitted = f"a whole number in [{low}, {high}]"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise InputError(parameter, value, permitted)
+    number = float(value)
+    if not math.isfinite(number) or number != int(number) or not low <= number <= high:
+        raise InputError(parameter, value, permitted)
+    return int(number)

@@ -1,0 +1,278 @@
+"""Output-feedback structures u = K1 Y(t) + K2 Y(t − τ0) (Eqs. 36-40), and closing the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.delay_system import DelaySystem
+from drillctrl.errors import InputError, checked_number
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+ANGLE_BOUND = 10.0
+RATE_BOUND = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class FeedbackStructure:
+    """Which outputs are fed back to which inputs, now and delayed, and within what bounds.
+
+    An entry of a gain matrix whose lower and upper bounds coincide is fixed; all others
+    are free. The free gains, K1 before K2 and row by row, form the gain vector.
+
+    Attributes
+    ----------
+    name : str
+        Name for summaries.
+    outputs : tuple of str
+        Names of the states that are measured, in the order of Y.
+    K1_lower, K1_upper : array, (m, p)
+        Bounds of the gains on Y(t).
+    K2_lower, K2_upper : array, (m, p)
+        Bounds of the gains on Y(t − τ).
+    inputs : tuple of str
+        Names of the inputs that are driven, m of them.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit, a bound is not finite, or bounds are swapped.
+    """
+
+    name: str
+    outputs: tuple[str, ...]
+    K1_lower: FloatArray
+    K1_upper: FloatArray
+    K2_lower: FloatArray
+    K2_upper: FloatArray
+    inputs: tuple[str, ...] = ("torque",)
+
+    def __post_init__(self) -> None:
+        shape = (len(self.inputs), len(self.outputs))
+        for field in ("K1_lower", "K1_upper", "K2_lower", "K2_upper"):
+            bound = np.array(getattr(self, field), dtype=float)
+            if bound.shape != shape:
+                raise InputError(field, f"array of shape {bound.shape}", f"of shape {shape}")
+            if not np.isfinite(bound).all():
+                raise InputError(field, bound.tolist(), "finite")
+            bound.setflags(write=False)
+            object.__setattr__(self, field, bound)
+        for gain in ("K1", "K2"):
+            low, high = getattr(self, f"{gain}_lower"), getattr(self, f"{gain}_upper")
+            if (low > high).any():
+                raise InputError(
+                    f"bound of {gain}",
+                    f"{low[low > high][0]:g}:{high[low > high][0]:g}",
+                    "given as lower:upper with lower ≤ upper",
+                )
+
+    @property
+    def lower(self) -> FloatArray:
+        """Lower bounds of the gain vector, shape (k,)."""
+        return np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])[self.free]
+
+    @property
+    def upper(self) -> FloatArray:
+        """Upper bounds of the gain vector, shape (k,)."""
+        return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])[self.free]
+
+    @property
+    def free(self) -> BoolArray:
+        """Which entries of (K1, K2), flattened, are free; shape (2 m p,)."""
+        low = np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
+        high = np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
+        return np.asarray(low < high)
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """Names of the free gains, ``K1_1`` and so on, in the order of the vector."""
+        shape = self.K1_lower.shape
+        one_row = shape[0] == 1
+        names = [
+            f"{gain}_{j + 1}" if one_row else f"{gain}_{i + 1}_{j + 1}"
+            for gain in ("K1", "K2")
+            for i in range(shape[0])
+            for j in range(shape[1])
+        ]
+        return tuple(name for name, free in zip(names, self.free, strict=True) if free)
+
+    def gains(self, vector: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return K1 and K2, each (m, p), from a vector of the free gains."""
+        flat = np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
+        flat[self.free] = vector
+        half = flat.size // 2
+        shape = self.K1_lower.shape
+        return flat[:half].reshape(shape), flat[half:].reshape(shape)
+
+    def with_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> FeedbackStructure:
+        """Return the structure with other bounds.
+
+        Parameters
+        ----------
+        bounds : mapping
+            From ``"K1"`` or ``"K2"`` (all free gains of that matrix) or a name among
+            `gain_names` to (lower, upper). Single gains overrule whole matrices.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or bounds are swapped or not finite.
+        """
+        arrays = [
+            np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()]),
+            np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()]),
+        ]
+        positions = dict(zip(self.gain_names, np.flatnonzero(self.free), strict=True))
+        for key in sorted(bounds, key=len):
+            low, high = bounds[key]
+            where = [
+                i for name, i in positions.items() if name == key or name.startswith(key + "_")
+            ]
+            if not where:
+                known = ", ".join(("K1", "K2", *self.gain_names))
+                raise InputError("bound", key, f"on one of the gains {known}")
+            if checked_number(f"bound {key}", low) > checked_number(f"bound {key}", high):
+                raise InputError(f"bound {key}", f"{low:g}:{high:g}", "lower:upper, lower ≤ upper")
+            arrays[0][where], arrays[1][where] = low, high
+        half, shape = arrays[0].size // 2, self.K1_lower.shape
+        return replace(
+            self,
+            K1_lower=arrays[0][:half].reshape(shape),
+            K1_upper=arrays[1][:half].reshape(shape),
+            K2_lower=arrays[0][half:].reshape(shape),
+            K2_upper=arrays[1][half:].reshape(shape),
+        )
+
+
+def _torque_structure(name: str, bounds: Sequence[float], *, delayed: bool) -> FeedbackStructure:
+    box = np.array([bounds])
+    past = box if delayed else np.zeros_like(box)
+    outputs = ("theta", "dtheta")[: len(bounds)]
+    return FeedbackStructure(name, outputs, -box, box, -past, past)
+
+
+def structure(name: str) -> FeedbackStructure:
+    """Return a preset structure with the paper's bounds (Eqs. 37, 39, 43).
+
+    Parameters
+    ----------
+    name : str
+        ``"p"``: θ; ``"case1"``: θ and delayed θ; ``"pd"``: θ and θ';
+        ``"case2"``: θ and θ', both also delayed.
+
+    Raises
+    ------
+    InputError
+        If there is no such preset.
+    """
+    presets = {
+        "p": ((ANGLE_BOUND,), False),
+        "case1": ((ANGLE_BOUND,), True),
+        "pd": ((ANGLE_BOUND, RATE_BOUND), False),
+        "case2": ((ANGLE_BOUND, RATE_BOUND), True),
+    }
+    if name not in presets:
+        raise InputError("structure", name, f"one of {', '.join(presets)}")
+    bounds, delayed = presets[name]
+    return _torque_structure(name, bounds, delayed=delayed)
+
+
+STRUCTURE_NAMES = ("p", "case1", "pd", "case2")
+
+
+def gain_matrices(
+    feedback: FeedbackStructure, K1: npt.ArrayLike, K2: npt.ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return K1 and K2 as (m, p) arrays from flat lists, checked against the structure.
+
+    Gains outside the structure's bounds are permitted; they bind the design only.
+
+    Raises
+    ------
+    InputError
+        If a gain is missing, not finite, or not zero where the structure has none.
+    """
+    shape = feedback.K1_lower.shape
+    matrices = []
+    for name, given in (("K1", K1), ("K2", K2)):
+        try:
+            flat = np.atleast_1d(np.asarray(0.0 if given is None else given, dtype=float)).ravel()
+        except (TypeError, ValueError):
+            raise InputError(name, repr(given), "a list of numbers") from None
+        if given is None:
+            flat = np.zeros(shape).ravel()
+        if flat.size != shape[0] * shape[1]:
+            count = shape[0] * shape[1]
+            raise InputError(name, flat.tolist(), f"{count} gain(s), one for each output")
+        if not np.isfinite(flat).all():
+            raise InputError(name, flat.tolist(), "finite")
+        matrices.append(flat.reshape(shape))
+    unused = ~feedback.free[shape[0] * shape[1] :] & (feedback.K2_upper.ravel() == 0.0)
+    if matrices[1].ravel()[unused].any():
+        raise InputError("K2", matrices[1].ravel().tolist(), f"0 for structure {feedback.name}")
+    return matrices[0], matrices[1]
+
+
+def close_loop(
+    system: DelaySystem,
+    feedback: FeedbackStructure,
+    K1: npt.ArrayLike,
+    K2: npt.ArrayLike | None = None,
+    delay: float | None = None,
+) -> DelaySystem:
+    """Close the loop: A0 + B K1 C and Aτ + B K2 C (Eq. 40).
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        Names the outputs and the inputs.
+    K1, K2 : array_like, (m, p) or flat
+        Gains on Y(t) and on Y(t − delay).
+    delay : float, optional
+        Delay of the fed-back signals; by default the largest delay of the plant.
+
+    Returns
+    -------
+    DelaySystem
+        The same states, inputs and outputs; u is what is added to the feedback.
+    """
+    now, past = gain_matrices(feedback, K1, K2)
+    drive, measure = loop_channels(system, feedback)
+    delay = system.max_delay if delay is None else checked_number("delay", delay, 0.0)
+    matrices = dict(zip(system.delays, system.delayed, strict=True))
+    if past.any():
+        matrices[delay] = system.delayed_matrix(delay) + drive @ past @ measure
+    delays = tuple(sorted(matrices))
+    return replace(
+        system,
+        A0=system.A0 + drive @ now @ measure,
+        delayed=tuple(matrices[tau] for tau in delays),
+        delays=delays,
+    )
+
+
+def loop_channels(
+    system: DelaySystem, feedback: FeedbackStructure
+) -> tuple[FloatArray, FloatArray]:
+    """Return the columns of B and the rows of C that a structure uses.
+
+    Raises
+    ------
+    InputError
+        If the plant has no such input or output.
+    """
+    for name in feedback.inputs:
+        if name not in system.input_names:
+            raise InputError("input", name, f"one of {', '.join(system.input_names)}")
+    for name in feedback.outputs:
+        if name not in system.output_names:
+            raise InputError("output", name, f"one of {', '.join(system.output_names)}")
+    columns = [system.input_names.index(name) for name in feedback.inputs]
+    rows = [system.output_names.index(name) for name in feedback.outputs]
+    return system.B[:, columns], system.C[rows]

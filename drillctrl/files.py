@@ -1,0 +1,55 @@
+"""Write files whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+
+@contextlib.contextmanager
+def replacing(path: str | Path) -> Iterator[IO[bytes]]:
+    """Open a file for writing that takes its place at ``path`` only once complete.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where the file is to be; its folder must exist.
+
+    Yields
+    ------
+    file
+        A binary file beside ``path``. On leaving without an exception it is flushed to
+        disk and moved onto ``path``; otherwise it is removed and ``path`` is untouched.
+
+    Raises
+    ------
+    OSError
+        If the folder does not exist, cannot be written to, or is full.
+    """
+    target = Path(path)
+    descriptor, name = tempfile.mkstemp(
+        prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent
+    )
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a UTF-8 text file whole or not at all (see `replacing`)."""
+    with replacing(path) as file:
+        file.write(text.encode("utf-8"))
