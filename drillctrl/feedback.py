@@ -71,21 +71,29 @@ class FeedbackStructure:
                 )
 
     @property
+    def flat_lower(self) -> FloatArray:
+        """Lower bounds of all entries of K1, then K2, row by row, shape (2 m p,)."""
+        return np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
+
+    @property
+    def flat_upper(self) -> FloatArray:
+        """Upper bounds of all entries of K1, then K2, row by row, shape (2 m p,)."""
+        return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
+
+    @property
     def lower(self) -> FloatArray:
         """Lower bounds of the gain vector, shape (k,)."""
-        return np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])[self.free]
+        return self.flat_lower[self.free]
 
     @property
     def upper(self) -> FloatArray:
         """Upper bounds of the gain vector, shape (k,)."""
-        return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])[self.free]
+        return self.flat_upper[self.free]
 
     @property
     def free(self) -> BoolArray:
         """Which entries of (K1, K2), flattened, are free; shape (2 m p,)."""
-        low = np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
-        high = np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
-        return np.asarray(low < high)
+        return np.asarray(self.flat_lower < self.flat_upper)
 
     @property
     def gain_names(self) -> tuple[str, ...]:
@@ -102,7 +110,7 @@ class FeedbackStructure:
 
     def gains(self, vector: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return K1 and K2, each (m, p), from a vector of the free gains."""
-        flat = np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
+        flat = self.flat_lower
         flat[self.free] = vector
         half = flat.size // 2
         shape = self.K1_lower.shape
@@ -122,10 +130,7 @@ class FeedbackStructure:
         InputError
             If a name is unknown or bounds are swapped or not finite.
         """
-        arrays = [
-            np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()]),
-            np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()]),
-        ]
+        arrays = [self.flat_lower, self.flat_upper]
         positions = dict(zip(self.gain_names, np.flatnonzero(self.free), strict=True))
         for key in sorted(bounds, key=len):
             low, high = bounds[key]
@@ -155,7 +160,7 @@ def _torque_structure(name: str, bounds: Sequence[float], *, delayed: bool) -> F
     return FeedbackStructure(name, outputs, -box, box, -past, past)
 
 
-def structure(name: str) -> FeedbackStructure:
+def preset_structure(name: str) -> FeedbackStructure:
     """Return a preset structure with the paper's bounds (Eqs. 37, 39, 43).
 
     Parameters

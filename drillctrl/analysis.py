@@ -1,0 +1,202 @@
+"""What is known of one loop: its abscissa by independent routes, and how sure it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drillctrl.delay_system import DelaySystem, plant_system
+from drillctrl.feedback import FeedbackStructure, close_loop
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.count import count_right_of
+from drillctrl.spectrum.roots import Root, dominant_roots, spectral_abscissa
+from drillctrl.spectrum.semidiscretization import semidiscretize
+
+DEFAULT_ORDER = 2
+
+
+@dataclass(frozen=True)
+class SpectralRadius:
+    """ρ(D) of the semi-discretised loop.
+
+    Attributes
+    ----------
+    value : float
+        ρ(D).
+    m, order : int
+        Intervals and order of the scheme.
+    growth_rate : float
+        ln ρ(D)/Δt, to be compared with the spectral abscissa.
+    """
+
+    value: float
+    m: int
+    order: int
+    growth_rate: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Agreement of the roots found with a count that knows nothing of them.
+
+    Attributes
+    ----------
+    line : float
+        Re s of the line, drawn left of the dominant root.
+    counted : int or None
+        Roots right of it by the argument principle; None if undecided.
+    found : int
+        Roots right of it among those computed.
+    height : float
+        The line was followed up to this |Im s|.
+    agrees : bool
+        Whether both numbers are the same.
+    """
+
+    line: float
+    counted: int | None
+    found: int
+    height: float
+    agrees: bool
+
+
+@dataclass(frozen=True)
+class LoopAnalysis:
+    """Spectrum of one loop.
+
+    Attributes
+    ----------
+    spectral_abscissa : float
+        α, per unit of time of the system.
+    abscissa_error : float
+        How far rounding of the coefficients may have moved it.
+    stable : bool
+        Whether α lies left of zero by more than the error, and the count agrees.
+    dominant_roots : tuple of Root
+        Those whose real part is within the error, or 1e-6 relative, of α.
+    spectral_radius : SpectralRadius or None
+        The semi-discretisation's view; None without delay.
+    certificate : Certificate
+        The count's view.
+    """
+
+    spectral_abscissa: float
+    abscissa_error: float
+    stable: bool
+    dominant_roots: tuple[Root, ...]
+    spectral_radius: SpectralRadius | None
+    certificate: Certificate
+
+    @property
+    def settling_time(self) -> float:
+        """Time in which exp(αt) falls to 2 %; infinite for an unstable loop."""
+        return math.log(50.0) / -self.spectral_abscissa if self.stable else math.inf
+
+
+def analyze_loop(
+    system: DelaySystem, m: int | None = None, order: int = DEFAULT_ORDER
+) -> LoopAnalysis:
+    """Analyse a delay system by roots, count and semi-discretisation.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        Any.
+    m, order : int, optional
+        Of the semi-discretisation that is reported; see `semidiscretize`.
+    """
+    roots = dominant_roots(system)
+    certificate = _certify(system, roots)
+    top = roots[0]
+    error = top.error + 1e-15 * abs(top.rightmost)
+    limit = top.rightmost - max(error, 1e-6 * (1.0 + abs(top.rightmost)))
+    radius = None
+    if system.delays:
+        scheme = semidiscretize(system, m, order)
+        radius = SpectralRadius(scheme.spectral_radius, scheme.m, scheme.order, scheme.growth_rate)
+    return LoopAnalysis(
+        spectral_abscissa=top.rightmost,
+        abscissa_error=error,
+        stable=top.rightmost + error < 0.0 and certificate.agrees and top.converged,
+        dominant_roots=tuple(root for root in roots if root.rightmost >= limit),
+        spectral_radius=radius,
+        certificate=certificate,
+    )
+
+
+def _certify(system: DelaySystem, roots: tuple[Root, ...]) -> Certificate:
+    """Count right of a line drawn in the widest gap left of the dominant root."""
+    floor = roots[0].rightmost - 1.0
+    if system.delays:
+        floor = roots[0].rightmost - 1.0 / system.max_delay
+        # Further left some roots may be known, but not all of them.
+        roots = tuple(root for root in roots if root.rightmost > floor)
+    # A cluster reaches as far left of its centre as right of it.
+    ends = [root.real - max(root.spread, root.error) for root in roots]
+    below = [root.rightmost for root in roots[1:]]
+    below.append(floor if system.delays else min(floor, ends[-1] - 1.0))
+    gaps = [min(ends[: i + 1]) - lower for i, lower in enumerate(below)]
+    widest = int(np.argmax(gaps))
+    line = below[widest] + 0.5 * gaps[widest]
+    count = count_right_of(system, line, np.array([root.imag for root in roots]))
+    found = sum(root.multiplicity * (2 if root.imag > 0 else 1) for root in roots[: widest + 1])
+    return Certificate(line, count.count, found, count.height, count.count == found)
+
+
+@dataclass(frozen=True)
+class Fragility:
+    """Spectral abscissa when something is not as designed.
+
+    Attributes
+    ----------
+    rounded_gains : float
+        With the gains rounded to three significant digits.
+    psi_low, psi_high : float
+        With ψ 5 % lower or higher.
+    delay_low, delay_high : float
+        With all delays 2 % shorter or longer.
+    """
+
+    rounded_gains: float
+    psi_low: float
+    psi_high: float
+    delay_low: float
+    delay_high: float
+
+    @property
+    def worst(self) -> float:
+        """The largest of the five."""
+        return max(self.rounded_gains, self.psi_low, self.psi_high, self.delay_low, self.delay_high)
+
+
+def round_to_digits(values: FloatArray, digits: int) -> FloatArray:
+    """Round every value to a number of significant digits."""
+    rounded = [float(f"{value:.{digits - 1}e}") for value in values.ravel()]
+    return np.array(rounded).reshape(values.shape)
+
+
+def with_scaled_delays(system: DelaySystem, factor: float) -> DelaySystem:
+    """Return the system with every delay multiplied by ``factor``."""
+    return replace(system, delays=tuple(tau * factor for tau in system.delays))
+
+
+def fragility(
+    point: OperatingPoint, feedback: FeedbackStructure, K1: FloatArray, K2: FloatArray
+) -> Fragility:
+    """Return the abscissa of a loop under small changes of gains, rock and delay."""
+
+    def loop(at: OperatingPoint, k1: FloatArray = K1, k2: FloatArray = K2) -> DelaySystem:
+        return close_loop(plant_system(at, feedback.inputs), feedback, k1, k2)
+
+    nominal = loop(point)
+    rounded = loop(point, round_to_digits(K1, 3), round_to_digits(K2, 3))
+    return Fragility(
+        rounded_gains=spectral_abscissa(rounded),
+        psi_low=spectral_abscissa(loop(point.with_changes(psi=0.95 * point.psi))),
+        psi_high=spectral_abscissa(loop(point.with_changes(psi=1.05 * point.psi))),
+        delay_low=spectral_abscissa(with_scaled_delays(nominal, 0.98)),
+        delay_high=spectral_abscissa(with_scaled_delays(nominal, 1.02)),
+    )

@@ -1,0 +1,1 @@
+"""Bounded nonsmooth minimisation of the spectral abscissa over feedback gains."""

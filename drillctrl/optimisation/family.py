@@ -1,0 +1,146 @@
+"""The closed loop as a family over its gain vector, made to be evaluated often."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dgeev
+
+from drillctrl.delay_system import DelaySystem
+from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
+from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class LoopFamily:
+    """All loops that one structure closes around one plant.
+
+    The collocated generator is affine in the gains, M(g) = M0 + Σ gj bj cjᵀ: a gain acts
+    from one output, now or delayed, on one input.
+
+    Attributes
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        The structure.
+    base : array, (q, q)
+        M0, the generator with the fixed gains and the free ones at zero.
+    actuation : array, (q, k)
+        Columns bj.
+    measurement : array, (k, q)
+        Rows cjᵀ.
+    """
+
+    system: DelaySystem
+    feedback: FeedbackStructure
+    base: FloatArray
+    actuation: FloatArray
+    measurement: FloatArray
+
+    def loop(self, gains: FloatArray) -> DelaySystem:
+        """Return the closed loop at a gain vector."""
+        return close_loop(self.system, self.feedback, *self.feedback.gains(gains))
+
+    def matrix(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated generator at a gain vector, shape (q, q)."""
+        return self.base + (self.actuation * gains) @ self.measurement
+
+    def abscissa(self, gains: FloatArray) -> tuple[float, FloatArray]:
+        """Return the collocated spectral abscissa and its gradient.
+
+        Parameters
+        ----------
+        gains : array, (k,)
+            The gain vector.
+
+        Returns
+        -------
+        value : float
+            Largest real part of an eigenvalue of M(g).
+        gradient : array, (k,)
+            Re (yᴴ bj)(cjᵀ x) / (yᴴ x) for the rightmost eigenvalue; one of the gradients
+            there are where several eigenvalues are rightmost.
+        """
+        real, imag, left, right, info = dgeev(self.matrix(gains), 1, 1)
+        if info:
+            return np.inf, np.zeros_like(gains)
+        top = int(np.argmax(real))
+        y, x = left[:, top], right[:, top]
+        if imag[top] != 0.0:
+            # LAPACK stores a conjugate pair as real and imaginary columns.
+            first = top if imag[top] > 0 else top - 1
+            y = left[:, first] + 1j * left[:, first + 1]
+            x = right[:, first] + 1j * right[:, first + 1]
+        y = y.conj()
+        scale = y @ x
+        slopes = (y @ self.actuation) * (self.measurement @ x)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            gradient = np.real(slopes / scale)
+        return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
+
+    def eigenvalues(self, gains: FloatArray) -> ComplexArray:
+        """Return the eigenvalues of the collocated generator, rightmost first."""
+        values = np.linalg.eigvals(self.matrix(gains)).astype(complex)
+        return values[np.argsort(-values.real, kind="stable")]
+
+
+def loop_family(
+    system: DelaySystem, feedback: FeedbackStructure, degree: int | None = None
+) -> LoopFamily:
+    """Assemble the family of closed loops.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant, with at least one delay where the structure uses delayed outputs.
+    feedback : FeedbackStructure
+        Names inputs, outputs and bounds.
+    degree : int, optional
+        Of the collocation; by default what the largest gains within the bounds need.
+    """
+    drive, measure = loop_channels(system, feedback)
+    half = feedback.K1_lower.size
+    free = np.flatnonzero(feedback.free)
+    fixed = np.where(feedback.free, 0.0, feedback.flat_lower)
+    shape = feedback.K1_lower.shape
+    plain = close_loop(system, feedback, fixed[:half].reshape(shape), fixed[half:].reshape(shape))
+    # Carry what the plant delays anyway and the measured outputs that are fed back late.
+    left, right = plain.factors[-1]
+    for source in sorted({(i % half) % shape[1] for i in free if i >= half}):
+        wider = np.vstack([right, measure[source]])
+        if np.linalg.matrix_rank(wider) > right.shape[0]:
+            right = wider
+    left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
+    factors = (*plain.factors[:-1], (left, right))
+    if degree is None:
+        degree = max(4, degree_for(_largest(system, feedback), 0.0))
+    base = generator_matrix(plain, degree, factors)
+    size, n, rank = base.shape[0], system.order, right.shape[0]
+    actuation = np.zeros((size, free.size))
+    measurement = np.zeros((free.size, size))
+    for column, index in enumerate(free):
+        source = (index % half) % measure.shape[0]
+        actuation[:n, column] = drive[:, (index % half) // measure.shape[0]]
+        if index < half:
+            measurement[column, :n] = measure[source]
+        else:
+            weights = np.linalg.lstsq(right.T, measure[source], rcond=None)[0]
+            measurement[column, size - rank :] = weights
+    return LoopFamily(system, feedback, base, actuation, measurement)
+
+
+def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:
+    """Return a loop whose matrices bound those of every loop in the family."""
+    drive, measure = loop_channels(system, feedback)
+    now = np.maximum(np.abs(feedback.K1_lower), np.abs(feedback.K1_upper))
+    past = np.maximum(np.abs(feedback.K2_lower), np.abs(feedback.K2_upper))
+    lag = system.max_delay
+    delayed = tuple(
+        np.abs(a) + (np.abs(drive) @ past @ np.abs(measure) if tau == lag else 0.0)
+        for tau, a in zip(system.delays, system.delayed, strict=True)
+    )
+    magnitude = np.abs(system.A0) + np.abs(drive) @ now @ np.abs(measure)
+    return DelaySystem(magnitude, delayed, system.delays, system.B, system.C)

@@ -1,0 +1,1 @@
+"""Characteristic roots of delay systems: three routes that check one another."""
