@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from drillctrl.errors import InputError
 from drillctrl.operating_point import OperatingPoint
@@ -102,7 +103,7 @@ class DelaySystem:
     @property
     def order(self) -> int:
         """Number of states, n."""
-        return self.A0.shape[0]
+        return int(self.A0.shape[0])
 
     @property
     def max_delay(self) -> float:
@@ -144,22 +145,22 @@ class DelaySystem:
 def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Factor a matrix as L @ R with as few columns of L as its numerical rank.
 
-    Where a set of the matrix's own columns or rows does, it is used, so that the delayed
-    signals keep their meaning and their exact coefficients.
+    R consists of rows of the matrix itself, so that the delayed signals keep their exact
+    coefficients.
     """
-    size = max(matrix.shape)
-    left, singular, right = np.linalg.svd(matrix)
-    tolerance = singular[0] * size * np.finfo(float).eps if singular.size else 0.0
-    rank = int((singular > tolerance).sum())
-    if rank == 0:
-        return np.zeros((matrix.shape[0], 0)), np.zeros((0, matrix.shape[1]))
-    columns = np.flatnonzero(matrix.any(axis=0))
-    if columns.size == rank:
-        return matrix[:, columns], np.eye(matrix.shape[1])[columns]
     rows = np.flatnonzero(matrix.any(axis=1))
-    if rows.size == rank:
-        return np.eye(matrix.shape[0])[:, rows], matrix[rows]
-    return left[:, :rank] * singular[:rank], right[:rank]
+    left = np.zeros((matrix.shape[0], 0))
+    if rows.size == 0:
+        return left, np.zeros((0, matrix.shape[1]))
+    _, triangle, order = scipy.linalg.qr(matrix[rows].T, mode="economic", pivoting=True)
+    size = np.abs(np.diag(triangle))
+    rank = int((size > size[0] * max(matrix.shape) * np.finfo(float).eps).sum())
+    kept = np.sort(rows[order[:rank]])
+    right = matrix[kept]
+    left = np.zeros((matrix.shape[0], rank))
+    left[rows] = scipy.linalg.lstsq(right.T, matrix[rows].T)[0].T
+    left[kept] = np.eye(rank)
+    return left, right
 
 
 def plant_system(

@@ -67,8 +67,8 @@ class OperatingPoint:
         object.__setattr__(self, "blades", checked_integer("blades", self.blades, 1, 100))
         if self.lam is None:
             object.__setattr__(self, "lam", LAMBDA_OVER_PSI * self.psi)
-        check("lam", 0.0, 1e7)
-        check("beta", 0.0, 1e7)
+        check("lam", 0.0, 1e9)
+        check("beta", 0.0, 1e9)
 
     @property
     def delay(self) -> float:

@@ -113,5 +113,13 @@ def plot_roots(design: Design, ax: Axes | None = None) -> Axes:
     ax.set_ylabel("Im s")
     p = design.point
     ax.set_title(f"Characteristic roots at ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}")
-    ax.legend(loc="upper left", fontsize="small")
+    for root in design.loop.dominant_roots:
+        if root.multiplicity > 1:
+            ax.annotate(
+                f"{root.multiplicity} roots",
+                (root.real, root.imag),
+                xytext=(8, 8),
+                textcoords="offset points",
+            )
+    ax.legend(loc="best", fontsize="small")
     return ax

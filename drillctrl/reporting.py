@@ -241,8 +241,8 @@ def _verdict_lines(design: Design) -> _Lines:
     check = loop.certificate
     word = "agrees" if check.agrees else "DOES NOT AGREE"
     counted = "undecided" if check.counted is None else str(check.counted)
-    text = f"argument principle {word}: {counted} root(s) right of {check.line:.4g}, {check.found} found"
-    lines.append(("Checked by", text))
+    right = f"{counted} root(s) right of {check.line:.4g}, {check.found} found"
+    lines.append(("Checked by", f"argument principle {word}: {right}"))
     radius = loop.spectral_radius
     if radius is not None:
         lines.append(
@@ -252,14 +252,14 @@ def _verdict_lines(design: Design) -> _Lines:
                 f"ρ(D) = {radius.value:.9f}, ln ρ/Δt = {radius.growth_rate:.6f}",
             )
         )
-    if design.fragility is not None:
-        off = design.fragility
+    off = design.fragility
+    if off is not None:
         lines += [
             ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits"),
-            ("", f"{off.psi_low:.4f} and {off.psi_high:.4f} with ψ 5 % lower and higher"),
+            ("", f"{off.psi_low:.4f} and {off.psi_high:.4f} with ψ 5 % lower or higher"),
             (
                 "",
-                f"{off.delay_low:.4f} and {off.delay_high:.4f} with the delay 2 % shorter and longer",
+                f"{off.delay_low:.4f} and {off.delay_high:.4f} with τ0 2 % shorter or longer",
             ),
         ]
     return lines

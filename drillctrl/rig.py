@@ -187,9 +187,11 @@ def _rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
         raise InputError(f"{missing[0]} in {source}", "(missing)", "given")
     values: dict[str, Any] = {}
     for key, value in data.items():
-        dimension = known[key].metadata.get("dimension")
-        plain = dimension is None or (dimension is units.NUMBER and not isinstance(value, str))
-        values[key] = value if plain else units.to_si(f"{key} in {source}", value, dimension)
+        dimension: Dimension | None = known[key].metadata.get("dimension")
+        if dimension is None or (dimension is units.NUMBER and not isinstance(value, str)):
+            values[key] = value
+        else:
+            values[key] = units.to_si(f"{key} in {source}", value, dimension)
     return Rig(**values)
 
 

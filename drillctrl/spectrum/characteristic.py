@@ -25,7 +25,7 @@ def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
             * np.exp(-1j * delay * points.imag)
             * delayed
         )
-    return delta
+    return np.asarray(delta, dtype=complex)
 
 
 def derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:

@@ -140,14 +140,17 @@ def _gather(system: DelaySystem, line: float, values: ComplexArray, degree: int)
         At least the degree that resolves the line, or 0 to have it chosen.
     """
     needed = degree_for(system, line)
+    reach = characteristic.magnitude_bound(system, line - 0.02)
     # The rule has a reserve; a line only slightly further left does not use it up.
     if degree < needed - 2:
         degree = needed
         values = approximate_roots(system, degree)
     while True:
         # Starting values of a k-fold root are off by the k-th root of the error.
-        slack = 0.02 * (1.0 + np.abs(values))
-        start = values[(values.imag >= 0) & (values.real >= line - slack)]
+        size = np.abs(values)
+        wanted = (values.imag >= 0) & (values.real >= line - 0.02 * (1.0 + size))
+        # No root lies beyond the bound: what the collocation has there is its own.
+        start = values[wanted & (size <= 1.1 * reach)]
         s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
         if (done & ~strayed).all() or degree > MAX_DEGREE // 2:

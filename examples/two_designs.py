@@ -1,0 +1,8 @@
+"""Which gains hold a rig steady at point C of the paper, and what do two more gains buy?"""
+
+from drillctrl import OperatingPoint, design
+
+point = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)
+for name in ("case1", "case2"):
+    result = design(point, name)
+    print(result.summary(), end="\n\n")

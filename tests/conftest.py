@@ -1,0 +1,27 @@
+"""Points of the paper that several tests use, and how hypothesis draws."""
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from drillctrl import OperatingPoint, plant_system
+
+settings.register_profile(
+    "drillctrl",
+    deadline=None,
+    derandomize=True,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("drillctrl")
+
+
+@pytest.fixture(scope="session")
+def point_c():
+    """Point C of Fig. 8."""
+    return OperatingPoint(10.0, 1.75, 14.0)
+
+
+@pytest.fixture(scope="session")
+def plant_c(point_c):
+    """The open loop at point C."""
+    return plant_system(point_c)

@@ -1,0 +1,165 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+from drillctrl import cli, save_rig, table1
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        cli.main([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return stop.value.code, captured.out, captured.err
+
+
+def test_default_is_point_c(capsys):
+    status, out, err = run(capsys, "analyze", "--json")
+    result = json.loads(out)
+    assert (status, err) == (0, "")
+    assert result["operating_point"]["omega0"] == 10.0
+    assert result["operating_point"]["delta0"] == 1.75
+    assert result["spectral_abscissa"] == pytest.approx(0.009760358069533952, abs=1e-10)
+    assert result["structure"] is None
+
+
+def test_given_gains(capsys):
+    status, out, _ = run(
+        capsys, "analyze", "--structure", "case2", "--K1", "-5.03,-4.91", "--K2", "-1.67,-0.31",
+        "--omega0", 10, "--delta0", 12, "--psi", 14, "--json",
+    )  # fmt: skip
+    result = json.loads(out)
+    assert status == 0
+    assert result["K1"] == [-5.03, -4.91]
+    assert result["stable"]
+
+
+def test_design_has_the_fields_of_the_contract(capsys):
+    status, out, _ = run(capsys, "design", "--structure", "p", "--json")
+    result = json.loads(out)
+    assert status == 0
+    assert {
+        "schema", "operating_point", "structure", "bounds", "K1", "K2", "spectral_abscissa",
+        "stable", "dominant_roots", "spectral_radius", "open_loop", "certificate", "robustness",
+        "evaluations", "elapsed_seconds",
+    } <= result.keys()  # fmt: skip
+    assert result["schema"] == "drillctrl/design/1"
+    assert {"real", "imag", "multiplicity"} <= result["dominant_roots"][0].keys()
+    assert {"value", "m", "order"} <= result["spectral_radius"].keys()
+    assert {"spectral_abscissa", "stable"} <= result["open_loop"].keys()
+
+
+def test_rig_point_and_files(capsys, tmp_path):
+    rig, out_file, figure = tmp_path / "rig.toml", tmp_path / "d.json", tmp_path / "roots.png"
+    save_rig(table1(), rig)
+    status, out, _ = run(
+        capsys, "analyze", "--rig", rig, "--speed", "150 rpm", "--rop", "20 m/h",
+        "--out", out_file, "--plot", figure,
+    )  # fmt: skip
+    assert status == 0
+    assert "150 rpm" in out
+    assert json.loads(out_file.read_text())["rig"]["weight_on_bit"] == pytest.approx(16416.0)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert {p.name for p in tmp_path.iterdir()} == {"rig.toml", "d.json", "roots.png"}
+
+
+def test_weight_on_bit_instead_of_rate(capsys):
+    arguments = ["analyze", "--rig", "table1", "--speed", "150 rpm", "--json"]
+    _, by_weight, _ = run(capsys, *arguments, "--wob", "16.416 kN")
+    _, by_rate, _ = run(capsys, *arguments, "--rop", "65.6167979 ft/h")
+    points = [json.loads(text)["operating_point"] for text in (by_weight, by_rate)]
+    assert points[0] == pytest.approx(points[1], rel=1e-6)
+
+
+def test_require_stable(capsys):
+    base = ["design", "--structure", "p", "--require-stable", "--omega0", 10, "--psi", 14]
+    status, out, _ = run(capsys, *base, "--delta0", 12)
+    assert status == 3
+    assert "not stabilised: best α" in out
+    assert run(capsys, *base, "--delta0", 1.75)[0] == 0
+
+
+BAD = [
+    (["analyze", "--omega0", "0"], "omega0 = 0.0: must be"),
+    (["analyze", "--omega0", "nan"], "omega0 = nan: must be"),
+    (["analyze", "--psi", "-1"], "psi = -1.0: must be"),
+    (["analyze", "--blades", "0"], "blades = 0"),
+    (["analyze", "--omega0", "ten"], "--omega0"),
+    (["design", "--bound", "K1=5:-5"], "bound K1 = 5:-5"),
+    (["design", "--bound", "K1"], "--bound = K1"),
+    (["design", "--bound", "K9=-1:1"], "bound = K9"),
+    (["design", "--structure", "case3"], "structure = case3"),
+    (["design", "--seed", "-1"], "seed = -1"),
+    (["analyze", "--rig", "table1", "--speed", "12 kg", "--rop", "20 m/h"], "--speed = '12 kg'"),
+    (["analyze", "--rig", "table1", "--speed", "0 rpm", "--rop", "20 m/h"], "rotary_speed = 0.0"),
+    (["analyze", "--rig", "table1", "--speed", "9 rpm"], "--rop = (missing)"),
+    (["analyze", "--speed", "120 rpm", "--rop", "20 m/h"], "--rig = (missing)"),
+    (["analyze", "--rig", "none.toml", "--speed", "9 rpm", "--rop", "2 m/h"], "rig = none.toml"),
+    (["analyze", "--omega0", "10", "--rig", "table1"], "--omega0 = 10.0: must be left out"),
+    (["analyze", "--damping", "0.1", "--xi", "0.1"], "--xi = 0.1: must be left out"),
+    (["analyze", "--structure", "case1", "--K1", "a", "--K2", "1"], "--K1 = a"),
+    (["analyze", "--structure", "case1", "--K1", "1"], "K2 = (missing)"),
+    (["analyze", "--order", "7"], "order = 7"),
+    (["analyze", "--m", "0"], "m = 0"),
+    (["analyze", "--out", "result.xyz"], "--out = result.xyz"),
+    (["analyze", "--out", "/no/such/folder/a.json"], "--out = /no/such/folder/a.json"),
+    (["analyze", "--plot", "roots.gif"], "plot = roots.gif"),
+    (["analyze", "--nonsense"], "--nonsense"),
+    (["invent"], "invent"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD)
+def test_bad_input_is_one_line_and_status_two(capsys, arguments, message):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert message in err
+
+
+def test_a_full_disk_leaves_the_old_file(capsys, tmp_path, monkeypatch):
+    import os
+
+    target = tmp_path / "old.json"
+    target.write_text("old")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    status, _, err = run(capsys, "analyze", "--out", target)
+    assert status == 2
+    assert "No space left on device" in err
+    assert target.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["old.json"]
+
+
+def test_every_verb_has_help_with_an_example(capsys):
+    for verb in ("design", "analyze"):
+        status, out, _ = run(capsys, verb, "--help")
+        assert status == 0
+        assert f"drillctrl {verb} --" in out
+
+
+def test_import_loads_nothing_that_is_not_used():
+    code = (
+        "import sys, drillctrl\n"
+        "heavy = {'numpy', 'scipy', 'casadi', 'matplotlib', 'pint', 'control', 'numba'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+        "drillctrl.design\n"
+        "late = {'matplotlib', 'pint', 'control', 'numba', 'pandas'}\n"
+        "assert not late & set(sys.modules), late & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_public_names_are_all_there():
+    import drillctrl
+
+    assert drillctrl.__all__ == sorted(drillctrl.__all__)
+    for name in drillctrl.__all__:
+        assert getattr(drillctrl, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'invented'"):
+        drillctrl.invented  # noqa: B018

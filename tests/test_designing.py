@@ -1,0 +1,110 @@
+import json
+
+import numpy as np
+import pytest
+
+from drillctrl import InputError, OperatingPoint, RigPoint, analyze, design, table1
+from drillctrl.spectrum.count import count_right_of
+
+
+def test_default_point_reaches_known_abscissas(point_c):
+    case1, case2 = design(point_c, "case1"), design(point_c, "case2")
+    assert case1.spectral_abscissa <= -0.81
+    assert case2.spectral_abscissa <= -1.37
+    for result in (case1, case2):
+        assert result.stable
+        loop = result.system()
+        assert count_right_of(loop, result.spectral_abscissa + 1e-2).count == 0
+        assert (result.structure.K1_lower <= result.K1).all()
+        assert (result.structure.K2_upper >= result.K2).all()
+
+
+def test_undelayed_feedback_cannot_stabilise_point_f():
+    result = design(OperatingPoint(10.0, 12.0, 14.0), "p")
+    assert not result.stable
+    assert result.spectral_abscissa == pytest.approx(0.0441, abs=5e-5)
+    assert result.K1[0, 0] == pytest.approx(-1.555, abs=5e-4)
+    assert "not stabilised: best α = 0.044" in result.summary()
+
+
+def test_same_seed_same_gains(point_c):
+    one, two = design(point_c, "case1", seed=3), design(point_c, "case1", seed=3)
+    assert one.K1.tobytes() == two.K1.tobytes()
+    assert one.K2.tobytes() == two.K2.tobytes()
+
+
+def test_bounds_bind(point_c):
+    result = design(point_c, "case1", bounds={"K1": (-2.0, 2.0), "K2_1": (0.0, 1.5)})
+    assert -2.0 <= result.K1[0, 0] <= 2.0
+    assert 0.0 <= result.K2[0, 0] <= 1.5
+    assert result.spectral_abscissa > design(point_c, "case1").spectral_abscissa
+
+
+def test_rig_points_are_reported_in_rig_units():
+    rig_point = RigPoint(table1(), 150 * np.pi / 30, 20 / 3600)
+    result = design(rig_point, "case2")
+    assert result.stable
+    text = result.summary()
+    for part in ("150 rpm", "20 m/h", "kN on bit", "kN·m on bit", "N·m/rad", "N·m·s/rad", " s"):
+        assert part in text
+    assert "stabilised" in text
+    rig = result.to_dict()["rig"]
+    stiffness, time = rig_point.rig.torsional_stiffness, rig_point.rig.time_scale
+    assert rig["K1"] == pytest.approx(
+        [result.K1[0, 0] * stiffness, result.K1[0, 1] * stiffness * time]
+    )
+    assert rig["settling_time_seconds"] == pytest.approx(
+        np.log(50) / -result.spectral_abscissa * time
+    )
+
+
+def test_open_and_given_loops_share_the_fields(point_c):
+    open_loop = analyze(point_c).to_dict()
+    given = analyze(point_c, "case1", [-5.17], [5.06], m=3, order=0).to_dict()
+    assert open_loop.keys() == given.keys()
+    assert open_loop["spectral_abscissa"] == pytest.approx(0.009760358069533952, abs=1e-12)
+    assert not open_loop["stable"]
+    assert given["stable"]
+    assert given["spectral_radius"]["value"] == pytest.approx(0.97933, abs=5e-6)
+    assert given["spectral_radius"]["m"] == 3
+    assert given["spectral_abscissa"] == pytest.approx(-0.4652, abs=5e-5)
+    assert given["certificate"]["agrees"]
+    json.dumps(given, allow_nan=False)
+
+
+def test_fragility_is_that_of_the_changed_loops(point_c):
+    result = analyze(point_c, "case1", [-5.173], [5.064])
+    rounded = analyze(point_c, "case1", [-5.17], [5.06])
+    softer = analyze(point_c.with_changes(psi=13.3), "case1", [-5.173], [5.064])
+    assert result.fragility.rounded_gains == pytest.approx(rounded.spectral_abscissa)
+    assert result.fragility.psi_low == pytest.approx(softer.spectral_abscissa)
+    assert result.fragility.worst >= result.fragility.psi_high
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("case1",), "K1"),
+        (("case1", [1.0]), "K2"),
+        ((None, [1.0], [2.0]), "structure"),
+        (("case1", [1.0, 2.0], [1.0]), "K1"),
+        (("case9", [1.0]), "structure"),
+    ],
+)
+def test_missing_or_surplus_gains_are_refused(point_c, arguments, message):
+    with pytest.raises(InputError, match=f"^{message} = "):
+        analyze(point_c, *arguments)
+
+
+def test_other_objects_are_no_points():
+    with pytest.raises(InputError, match="point = dict"):
+        design({"omega0": 1})
+
+
+def test_roots_are_drawn(point_c):
+    result = analyze(point_c, "case1", [-5.17], [5.06])
+    ax = result.plot()
+    drawn = np.vstack([c.get_offsets() for c in ax.collections if len(c.get_offsets())])
+    near = np.abs(drawn - [0.009760358, 0.8930716683]).sum(axis=1)
+    assert near.min() < 1e-6
+    assert ax.get_xlabel() == "Re s"
