@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from drillctrl.operating_point import OperatingPoint, RigPoint
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
+    from drillctrl.spectrum.batch import spectral_abscissas
+    from drillctrl.spectrum.comparison import compare_spectra, intervals_for
+    from drillctrl.spectrum.count import count_right_of
     from drillctrl.spectrum.roots import (
         Root,
         characteristic_roots,
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
         spectral_abscissa,
     )
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
+    from drillctrl.spectrum.sensitivity import root_sensitivity
     from drillctrl.steady_state import SteadyState, rig_point_at_weight_on_bit, steady_state
 
 _HOME = {
@@ -44,17 +48,22 @@ _HOME = {
     "analyze_loop": "analysis",
     "characteristic_roots": "spectrum.roots",
     "close_loop": "feedback",
+    "compare_spectra": "spectrum.comparison",
+    "count_right_of": "spectrum.count",
     "design": "designing",
     "dimensional_plant": "plant",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
+    "intervals_for": "spectrum.comparison",
     "load_rig": "rig",
     "plant_system": "delay_system",
     "preset_structure": "feedback",
     "rig_point_at_weight_on_bit": "steady_state",
+    "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
     "semidiscretize": "spectrum.semidiscretization",
     "spectral_abscissa": "spectrum.roots",
+    "spectral_abscissas": "spectrum.batch",
     "steady_state": "steady_state",
     "table1": "rig",
 }
@@ -89,17 +98,22 @@ __all__ = [
     "analyze_loop",
     "characteristic_roots",
     "close_loop",
+    "compare_spectra",
+    "count_right_of",
     "design",
     "dimensional_plant",
     "dimensionless_plant",
     "dominant_roots",
+    "intervals_for",
     "load_rig",
     "plant_system",
     "preset_structure",
     "rig_point_at_weight_on_bit",
+    "root_sensitivity",
     "save_rig",
     "semidiscretize",
     "spectral_abscissa",
+    "spectral_abscissas",
     "steady_state",
     "table1",
 ]

@@ -141,7 +141,7 @@ def _certify(system: DelaySystem, roots: tuple[Root, ...]) -> Certificate:
     gaps = [min(ends[: i + 1]) - lower for i, lower in enumerate(below)]
     widest = int(np.argmax(gaps))
     line = below[widest] + 0.5 * gaps[widest]
-    count = count_right_of(system, line, np.array([root.imag for root in roots]))
+    count = count_right_of(system, line)
     found = sum(root.multiplicity * (2 if root.imag > 0 else 1) for root in roots[: widest + 1])
     return Certificate(line, count.count, found, count.height, count.count == found)
 

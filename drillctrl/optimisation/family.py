@@ -116,7 +116,8 @@ def loop_family(
     left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
     factors = (*plain.factors[:-1], (left, right))
     if degree is None:
-        degree = max(4, degree_for(_largest(system, feedback), 0.0))
+        # Three more than suffices to start an iteration: here nothing is sharpened.
+        degree = degree_for(_largest(system, feedback), 0.0) + 3
     base = generator_matrix(plain, degree, factors)
     size, n, rank = base.shape[0], system.order, right.shape[0]
     actuation = np.zeros((size, free.size))

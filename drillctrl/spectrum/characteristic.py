@@ -17,32 +17,39 @@ _EXPONENT_LIMIT = 300.0
 
 def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return Δ(s) for every s, shape (..., n, n)."""
-    points = np.asarray(s, dtype=complex)[..., None, None]
-    delta = points * np.eye(system.order) - system.A0
-    for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        delta -= (
-            np.exp(np.minimum(-points.real * delay, _EXPONENT_LIMIT))
-            * np.exp(-1j * delay * points.imag)
-            * delayed
-        )
-    return np.asarray(delta, dtype=complex)
+    return _matrix_and_derivative(system, np.asarray(s, dtype=complex), with_derivative=False)[0]
 
 
 def derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return dΔ/ds for every s, shape (..., n, n)."""
-    points = np.asarray(s, dtype=complex)[..., None, None]
-    slope = np.broadcast_to(np.eye(system.order), (*points.shape[:-2], *system.A0.shape)) + 0j
+    return _matrix_and_derivative(system, np.asarray(s, dtype=complex))[1]
+
+
+def _matrix_and_derivative(
+    system: DelaySystem, points: ComplexArray, with_derivative: bool = True
+) -> tuple[ComplexArray, ComplexArray]:
+    points = points[..., None, None]
+    identity = np.eye(system.order)
+    delta = points * identity - system.A0
+    slope = np.zeros_like(delta)
+    if with_derivative:
+        slope += identity
     for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        slope = slope + delay * np.exp(-points * delay) * delayed
-    return np.asarray(slope, dtype=complex)
+        exponent = -delay * points
+        np.minimum(exponent.real, _EXPONENT_LIMIT, out=exponent.real)
+        term = np.exp(exponent) * delayed
+        delta -= term
+        if with_derivative:
+            slope += delay * term
+    return delta, slope
 
 
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
     points = np.asarray(s, dtype=complex)
-    delta, slope = matrix(system, points), derivative(system, points)
+    delta, slope = _matrix_and_derivative(system, points)
     try:
-        solved = np.linalg.solve(delta, slope)
+        inverse = np.linalg.inv(delta)
     except np.linalg.LinAlgError:
         # An s that is a root to the last bit: leave it where it is.
         values = np.full(points.shape, np.inf + 0j)
@@ -52,7 +59,7 @@ def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
             except np.linalg.LinAlgError:
                 continue
         return values
-    return np.asarray(np.einsum("...ii->...", solved))
+    return np.asarray(np.einsum("...ij,...ji->...", inverse, slope))
 
 
 def magnitude_bound(system: DelaySystem, right_of: float) -> float:
