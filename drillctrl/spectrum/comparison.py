@@ -113,7 +113,7 @@ def intervals_for(system: DelaySystem, tolerance: float, order: int = 0) -> int:
     """
     wanted = checked_number("tolerance", tolerance, 0.0, open_low=True)
     rate = 4 if order == 2 else 2
-    m = 10
+    m = 1
     while m <= MAX_INTERVALS:
         error = float(compare_spectra(system, m, order).errors.max())
         if error <= wanted:

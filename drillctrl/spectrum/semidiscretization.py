@@ -97,7 +97,8 @@ class SemiDiscretization:
         count : int
             How many.
         """
-        matrix = self.sparse_matrix()
+        # Complex throughout: a real matrix with a complex shift would be split in two.
+        matrix = self.sparse_matrix().astype(complex)
         start = np.cos(np.arange(matrix.shape[0]))
         values = scipy.sparse.linalg.eigs(
             matrix, k=count, sigma=target, v0=start, return_eigenvectors=False

@@ -19,9 +19,10 @@ def test_errors_shrink_with_the_square_of_the_step(loop):
 def test_sparse_and_dense_spectra_agree(loop):
     scheme = semidiscretize(loop, 120, 0)
     assert np.abs(scheme.sparse_matrix().toarray() - scheme.matrix()).max() == 0.0
-    dense = scheme.multipliers()[:2]
+    dense = scheme.multipliers()
     sparse = scheme.multipliers_near(complex(dense[0]) + 1e-6j, 2)
-    assert np.abs(np.sort_complex(sparse) - np.sort_complex(dense)).max() < 1e-9
+    assert abs(sparse[0] - dense[0]) < 1e-9
+    assert np.abs(dense - sparse[1]).min() < 1e-9
 
 
 def test_long_maps_stay_affordable_and_exact(loop):
@@ -35,7 +36,7 @@ def test_long_maps_stay_affordable_and_exact(loop):
 def test_chosen_intervals_reach_the_tolerance(loop, order):
     m = intervals_for(loop, 1e-5, order)
     assert compare_spectra(loop, m, order).errors.max() <= 1e-5
-    assert compare_spectra(loop, max(1, m // 3), order).errors.max() > 1e-5
+    assert m == 1 or compare_spectra(loop, m // 3 + 1, order).errors.max() > 1e-5
 
 
 def test_it_misleads_at_the_optimum(plant_c):
