@@ -22,7 +22,7 @@ from drillctrl.errors import InputError, checked_integer
 from drillctrl.feedback import FeedbackStructure, close_loop, gain_matrices, preset_structure
 from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.optimisation.family import loop_family
-from drillctrl.optimisation.search import multi_start
+from drillctrl.optimisation.search import global_search
 from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:
@@ -158,8 +158,8 @@ def design(
     chosen = _as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
     plant = plant_system(where, chosen.inputs)
-    search = multi_start(loop_family(plant, chosen), seed)
-    K1, K2 = chosen.gains(search.gains)
+    search = global_search(loop_family(plant, chosen), seed)
+    K1, K2 = chosen.gains(search.best.gains)
     result = _assess(where, rig_point, chosen, K1, K2, None, DEFAULT_ORDER)
     elapsed = time.perf_counter() - began
     return replace(result, evaluations=search.evaluations, elapsed_seconds=elapsed)

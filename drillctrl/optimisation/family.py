@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
 from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
+from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+
+
+BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +37,12 @@ class LoopFamily:
         Columns bj.
     measurement : array, (k, q)
         Rows cjᵀ.
+    plain : DelaySystem
+        The loop with the fixed gains only.
+    drive, seen : array, (n, k) and (k, n)
+        The same columns and rows in the states of the plant.
+    late : bool array, (k,)
+        Which gains act on a delayed output.
     """
 
     system: DelaySystem
@@ -39,6 +50,10 @@ class LoopFamily:
     base: FloatArray
     actuation: FloatArray
     measurement: FloatArray
+    plain: DelaySystem
+    drive: FloatArray
+    seen: FloatArray
+    late: BoolArray
 
     def loop(self, gains: FloatArray) -> DelaySystem:
         """Return the closed loop at a gain vector."""
@@ -80,6 +95,31 @@ class LoopFamily:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             gradient = np.real(slopes / scale)
         return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
+
+    def determinant(self, s: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return det Δ(s) of the loop and its derivatives by the gains.
+
+        Parameters
+        ----------
+        s : array, (q,)
+            Points that are no roots.
+        gains : array, (k,)
+            The gain vector.
+
+        Returns
+        -------
+        array, (q,), and array, (q, k)
+            ∂ det Δ/∂gj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
+        """
+        delta = characteristic.matrix(self.plain, s)
+        lag = np.exp(-s * self.plain.max_delay)
+        # Rows cj(s): a gain on a delayed output sees it through exp(−sτ).
+        seen = np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen
+        delta = delta - np.einsum("nk,qkm->qnm", self.drive * gains, seen)
+        value = np.linalg.det(delta)
+        response = np.linalg.inv(delta) @ self.drive
+        slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
+        return value, slopes
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""
@@ -130,7 +170,17 @@ def loop_family(
         else:
             weights = np.linalg.lstsq(right.T, measure[source], rcond=None)[0]
             measurement[column, size - rank :] = weights
-    return LoopFamily(system, feedback, base, actuation, measurement)
+    return LoopFamily(
+        system,
+        feedback,
+        base,
+        actuation,
+        measurement,
+        plain,
+        actuation[:n],
+        measure[(free % half) % shape[1]],
+        free >= half,
+    )
 
 
 def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:
