@@ -21,7 +21,9 @@ from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.errors import InputError, checked_integer
 from drillctrl.feedback import FeedbackStructure, close_loop, gain_matrices, preset_structure
 from drillctrl.operating_point import OperatingPoint, RigPoint
+from drillctrl.optimisation.certificate import OptimalityCertificate, certify_optimality
 from drillctrl.optimisation.family import loop_family
+from drillctrl.optimisation.rounding import hold_multiple_root
 from drillctrl.optimisation.search import global_search
 from drillctrl.spectrum.characteristic import FloatArray
 
@@ -47,6 +49,8 @@ class Design:
         With and without the feedback.
     fragility : Fragility or None
         The closed loop when gains, rock or delay are a little off.
+    optimality : OptimalityCertificate or None
+        Evidence that no better gains lie within the bounds; None for given gains.
     evaluations : int
         Eigenvalue problems that the search solved; 0 for given gains.
     elapsed_seconds : float
@@ -61,6 +65,7 @@ class Design:
     loop: LoopAnalysis
     open_loop: LoopAnalysis
     fragility: Fragility | None
+    optimality: OptimalityCertificate | None
     evaluations: int
     elapsed_seconds: float
 
@@ -157,12 +162,18 @@ def design(
     where, rig_point = _split_point(point)
     chosen = _as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
-    plant = plant_system(where, chosen.inputs)
-    search = global_search(loop_family(plant, chosen), seed)
-    K1, K2 = chosen.gains(search.best.gains)
+    family = loop_family(plant_system(where, chosen.inputs), chosen)
+    search = global_search(family, seed)
+    gains = hold_multiple_root(family, search.best)
+    K1, K2 = chosen.gains(gains)
     result = _assess(where, rig_point, chosen, K1, K2, None, DEFAULT_ORDER)
     elapsed = time.perf_counter() - began
-    return replace(result, evaluations=search.evaluations, elapsed_seconds=elapsed)
+    return replace(
+        result,
+        optimality=certify_optimality(family, gains, search),
+        evaluations=search.evaluations,
+        elapsed_seconds=elapsed,
+    )
 
 
 def analyze(
@@ -226,4 +237,4 @@ def _assess(
     if feedback is not None:
         loop = analyze_loop(closed_loop(point, feedback, K1, K2), m, order)
         off = fragility(point, feedback, K1, K2)
-    return Design(point, rig_point, feedback, K1, K2, loop, open_loop, off, 0, 0.0)
+    return Design(point, rig_point, feedback, K1, K2, loop, open_loop, off, None, 0, 0.0)

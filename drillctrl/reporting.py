@@ -46,6 +46,8 @@ def design_fields(design: Design) -> dict[str, Any]:
         "evaluations": design.evaluations,
         "elapsed_seconds": design.elapsed_seconds,
     }
+    if design.optimality is not None:
+        fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
     if design.fragility is not None:
         off = dataclasses.asdict(design.fragility)
         fields["robustness"] = {"spectral_abscissa_with": off}
@@ -252,6 +254,16 @@ def _verdict_lines(design: Design) -> _Lines:
                 f"ρ(D) = {radius.value:.9f}, ln ρ/Δt = {radius.growth_rate:.6f}",
             )
         )
+    if design.optimality is not None:
+        best = design.optimality
+        text = f"{best.method}, residual {best.stationarity:.1g}"
+        if best.active_bounds:
+            text += f"; on a bound: {', '.join(best.active_bounds)}"
+        lines.append(("Optimal by", text))
+        text = f"{best.hits} descent(s) ended here, {best.basins} distinct end(s)"
+        if best.next_best is not None:
+            text += f", next best α = {best.next_best:.4f}"
+        lines.append(("", text))
     off = design.fragility
     if off is not None:
         lines += [

@@ -7,10 +7,15 @@ from drillctrl import InputError, OperatingPoint, RigPoint, analyze, design, tab
 from drillctrl.spectrum.count import count_right_of
 
 
-def test_default_point_reaches_known_abscissas(point_c):
+def test_default_point_reaches_the_known_optima(point_c):
     case1, case2 = design(point_c, "case1"), design(point_c, "case2")
-    assert case1.spectral_abscissa <= -0.81
-    assert case2.spectral_abscissa <= -1.37
+    assert case1.spectral_abscissa == pytest.approx(-0.811927438342, abs=1e-8)
+    assert case1.K1[0, 0] == pytest.approx(-9.525113872, abs=1e-8)
+    assert case1.K2[0, 0] == pytest.approx(9.220013710, abs=1e-8)
+    assert case2.spectral_abscissa == pytest.approx(-1.392998065, abs=1e-8)
+    assert case2.K1.ravel() == pytest.approx([-9.861254902, 3.695722915], abs=1e-8)
+    assert case2.K2.ravel() == pytest.approx([10.0, -2.673320042], abs=1e-8)
+    assert case2.optimality.active_bounds == ("K2_1",)
     for result in (case1, case2):
         assert result.stable
         loop = result.system()

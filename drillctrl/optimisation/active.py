@@ -14,32 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.optimisation.family import LoopFamily
+from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
 _POINTS = 12
 _CIRCLE = np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)
-
-
-@dataclass(frozen=True)
-class ActiveRoot:
-    """A root that is taken to be rightmost.
-
-    Attributes
-    ----------
-    omega : float
-        Its imaginary part; 0 for a real root.
-    multiplicity : int
-        How often it is counted; a complex one implies its conjugate.
-    """
-
-    omega: float
-    multiplicity: int
-
-    @property
-    def equations(self) -> int:
-        """Number of real conditions."""
-        return self.multiplicity * (1 if self.omega == 0.0 else 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +173,17 @@ def sharpen(
     )
 
 
-def _radius(family: LoopFamily, s: complex) -> float:
+def active_jacobian(
+    family: LoopFamily, gains: FloatArray, abscissa: float, roots: tuple[ActiveRoot, ...]
+) -> FloatArray:
+    """Return the Jacobian of the conditions with respect to (gains, t, frequencies)."""
+    free = [i for i, root in enumerate(roots) if root.omega != 0.0]
+    u = np.concatenate([gains, [abscissa], [roots[i].omega for i in free]])
+    scale = _scales(family, gains, abscissa, roots)
+    return _conditions(family, u, gains.size, roots, free, scale)[1]
+
+
+def _radius(s: complex) -> float:
     return 0.1 * (1.0 + abs(s))
 
 
@@ -206,7 +195,7 @@ def _taylor(
     Coefficient l is multiplied by the l-th power of the radius of the circle. Shapes
     (terms,) and (terms, k).
     """
-    ring = s + _radius(family, s) * _CIRCLE
+    ring = s + _radius(s) * _CIRCLE
     determinant, slopes = family.determinant(ring, gains)
     wave = _CIRCLE[:, None] ** -np.arange(terms) / _POINTS
     return determinant @ wave, wave.T @ slopes
@@ -237,7 +226,7 @@ def _conditions(
         s = complex(u[k], omega)
         m = root.multiplicity
         taylor, slopes = _taylor(family, u[:k], s, m + 1)
-        radius = _radius(family, s)
+        radius = _radius(s)
         # d/ds of the l-th coefficient is l + 1 times the next one.
         by_s = np.arange(1, m + 1) * taylor[1 : m + 1] / radius
         block = np.zeros((m, u.size), dtype=complex)

@@ -67,9 +67,7 @@ def explicit_candidates(
     return np.vstack(kept)
 
 
-def _solve(
-    family: LoopFamily, conditions: list[tuple[ComplexArray, int, bool]]
-) -> FloatArray:
+def _solve(family: LoopFamily, conditions: list[tuple[ComplexArray, int, bool]]) -> FloatArray:
     """Return the gains for every place, shape (..., k); NaN where they are not determined."""
     rows, right = [], []
     k = family.drive.shape[1]
@@ -105,7 +103,7 @@ def _inside(family: LoopFamily, gains: FloatArray) -> FloatArray:
     hit = enter <= leave
     fractions = (enter[hit], 0.5 * (enter[hit] + leave[hit]), leave[hit])
     points = [start[hit] + f[:, None] * step[hit] for f in fractions]
-    return np.clip(np.vstack(points), lower, upper)
+    return np.asarray(np.clip(np.vstack(points), lower, upper))
 
 
 def _lowest(family: LoopFamily, gains: FloatArray, keep: int) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
@@ -14,8 +15,28 @@ from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
 
-
 BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ActiveRoot:
+    """A root that is taken to be rightmost.
+
+    Attributes
+    ----------
+    omega : float
+        Its imaginary part; 0 for a real root.
+    multiplicity : int
+        How often it is counted; a complex one implies its conjugate.
+    """
+
+    omega: float
+    multiplicity: int
+
+    @property
+    def equations(self) -> int:
+        """Number of real conditions."""
+        return self.multiplicity * (1 if self.omega == 0.0 else 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +116,19 @@ class LoopFamily:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             gradient = np.real(slopes / scale)
         return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
+
+    def active_gradients(
+        self, gains: FloatArray, width: float = 1e-6
+    ) -> tuple[FloatArray, tuple[ActiveRoot, ...]]:
+        """Return the gradients of all roots within ``width`` of the abscissa, (q, k)."""
+        values, left, right = scipy.linalg.eig(self.matrix(gains), left=True, right=True)
+        top = values.real.max()
+        active = np.flatnonzero((values.real > top - width * (1 + abs(top))) & (values.imag >= 0))
+        y, x = left[:, active].conj().T, right[:, active]
+        scale = np.einsum("qn,nq->q", y, x)
+        slopes = (y @ self.actuation) * (self.measurement @ x).T
+        roots = tuple(ActiveRoot(float(s.imag), 1) for s in values[active])
+        return np.real(slopes / scale[:, None]), roots
 
     def determinant(self, s: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return det Δ(s) of the loop and its derivatives by the gains.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from drillctrl.optimisation.active import ActiveRoot, hypotheses, sharpen
+from drillctrl.optimisation.active import hypotheses, sharpen
 from drillctrl.optimisation.descent import bfgs
 from drillctrl.optimisation.explicit import explicit_candidates
-from drillctrl.optimisation.family import LoopFamily
+from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import FloatArray
 
 # Relative distances up to which eigenvalues may be meant to coincide.
@@ -115,8 +115,8 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
         evaluations += end.evaluations
         ends.append(Basin(end.gains, end.value, ()))
     ends.sort(key=lambda basin: basin.value)
-    sharp = []
-    rest = []
+    sharp: list[Basin] = []
+    rest: list[Basin] = []
     width = upper - lower
     for i, basin in enumerate(ends):
         # Another descent into the same corner teaches nothing.
@@ -148,7 +148,7 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
     placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
     chosen = np.vstack([placed, points[order[: effort.begun - len(placed)]]])
-    return np.clip(chosen, inside[0], inside[1])
+    return np.asarray(np.clip(chosen, inside[0], inside[1]))
 
 
 def improve(family: LoopFamily, basin: Basin, rounds: int = 4) -> tuple[Basin, int]:

@@ -317,8 +317,9 @@ def _cluster(
         outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
         if outside < 4.0 * spread:
             continue
-        floor = 1e-3 * (1.0 + abs(centre))
-        radius = min(max(2.0 * spread, floor), 0.5 * outside)
+        # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
+        wide = min(0.2 * (1.0 + abs(centre)), 0.3 / system.max_delay if system.delays else 1.0)
+        radius = min(max(2.0 * spread, wide), 0.5 * outside)
         root = _multiple_root(system, members, centre, radius)
         if root is not None:
             return sorted({i for i, _ in mirrored[:size]}), root
