@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.feedback import FeedbackStructure, close_loop
 from drillctrl.operating_point import OperatingPoint
+from drillctrl.robustness import with_delay_factor
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.roots import Root, dominant_roots, spectral_abscissa
@@ -178,11 +179,6 @@ def round_to_digits(values: FloatArray, digits: int) -> FloatArray:
     return np.array(rounded).reshape(values.shape)
 
 
-def with_scaled_delays(system: DelaySystem, factor: float) -> DelaySystem:
-    """Return the system with every delay multiplied by ``factor``."""
-    return replace(system, delays=tuple(tau * factor for tau in system.delays))
-
-
 def fragility(
     point: OperatingPoint, feedback: FeedbackStructure, K1: FloatArray, K2: FloatArray
 ) -> Fragility:
@@ -197,6 +193,6 @@ def fragility(
         rounded_gains=spectral_abscissa(rounded),
         psi_low=spectral_abscissa(loop(point.with_changes(psi=0.95 * point.psi))),
         psi_high=spectral_abscissa(loop(point.with_changes(psi=1.05 * point.psi))),
-        delay_low=spectral_abscissa(with_scaled_delays(nominal, 0.98)),
-        delay_high=spectral_abscissa(with_scaled_delays(nominal, 1.02)),
+        delay_low=spectral_abscissa(with_delay_factor(nominal, 0.98)),
+        delay_high=spectral_abscissa(with_delay_factor(nominal, 1.02)),
     )
