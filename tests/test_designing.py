@@ -106,6 +106,30 @@ def test_other_objects_are_no_points():
         design({"omega0": 1})
 
 
+def test_the_alternative_is_better_when_something_is_off(point_c):
+    best = design(point_c, "case1")
+    other = best.robust_alternative(0.10)
+    assert other.spectral_abscissa <= 0.9 * best.spectral_abscissa + 1e-6
+    assert other.fragility.worst < best.fragility.worst
+    assert (np.abs(other.K1) <= 10).all()
+    with pytest.raises(InputError, match="give_up = 1.5"):
+        best.robust_alternative(1.5)
+    with pytest.raises(InputError, match="not a stabilised loop"):
+        analyze(point_c).robust_alternative()
+
+
+def test_both_designs_are_reported(point_c):
+    result = design(point_c, "case1")
+    fields = result.to_dict()
+    assert fields["alternative"]["give_up"] == 0.05
+    assert fields["alternative"]["stable"]
+    assert fields["robustness"]["stability_radius"] > 0
+    assert fields["robustness"]["delay_margin"]["longer"] > 1
+    assert fields["certificate"]["optimality"]["basins"] >= 1
+    assert "More robust" in result.summary()
+    json.dumps(fields, allow_nan=False)
+
+
 def test_roots_are_drawn(point_c):
     result = analyze(point_c, "case1", [-5.17], [5.06])
     ax = result.plot()

@@ -17,8 +17,7 @@ import scipy.optimize
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
-_POINTS = 12
-_CIRCLE = np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)
+_CIRCLES = {n: np.exp(2j * np.pi * np.arange(n) / n) for n in (8, 12)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,9 +194,11 @@ def _taylor(
     Coefficient l is multiplied by the l-th power of the radius of the circle. Shapes
     (terms,) and (terms, k).
     """
-    ring = s + _radius(s) * _CIRCLE
-    determinant, slopes = family.determinant(ring, gains)
-    wave = _CIRCLE[:, None] ** -np.arange(terms) / _POINTS
+    # Aliasing falls with the power points − terms of the ratio of circle to scale.
+    points = 8 if terms <= 3 else 12
+    circle = _CIRCLES[points]
+    determinant, slopes = family.determinant(s + _radius(s) * circle, gains)
+    wave = circle[:, None] ** -np.arange(terms) / points
     return determinant @ wave, wave.T @ slopes
 
 
@@ -205,7 +206,7 @@ def _scales(
     family: LoopFamily, gains: FloatArray, abscissa: float, roots: tuple[ActiveRoot, ...]
 ) -> list[float]:
     return [
-        float(np.abs(_taylor(family, gains, complex(abscissa, root.omega), 8)[0]).max())
+        float(np.abs(_taylor(family, gains, complex(abscissa, root.omega), 6)[0]).max())
         for root in roots
     ]
 

@@ -107,5 +107,4 @@ def _inside(family: LoopFamily, gains: FloatArray) -> FloatArray:
 
 
 def _lowest(family: LoopFamily, gains: FloatArray, keep: int) -> FloatArray:
-    values = np.array([family.abscissa(point)[0] for point in gains])
-    return gains[np.argsort(values, kind="stable")[:keep]]
+    return gains[np.argsort(family.abscissas(gains), kind="stable")[:keep]]

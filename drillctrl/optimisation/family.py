@@ -64,6 +64,8 @@ class LoopFamily:
         The same columns and rows in the states of the plant.
     late : bool array, (k,)
         Which gains act on a delayed output.
+    degree : int
+        Of the collocation.
     """
 
     system: DelaySystem
@@ -75,6 +77,7 @@ class LoopFamily:
     drive: FloatArray
     seen: FloatArray
     late: BoolArray
+    degree: int
 
     def loop(self, gains: FloatArray) -> DelaySystem:
         """Return the closed loop at a gain vector."""
@@ -117,6 +120,13 @@ class LoopFamily:
             gradient = np.real(slopes / scale)
         return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
 
+    def abscissas(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated spectral abscissa at many gain vectors, (q, k) → (q,)."""
+        if len(gains) == 0:
+            return np.zeros(0)
+        stack = self.base + (self.actuation * gains[:, None, :]) @ self.measurement
+        return np.asarray(np.linalg.eigvals(stack).real.max(axis=1))
+
     def active_gradients(
         self, gains: FloatArray, width: float = 1e-6
     ) -> tuple[FloatArray, tuple[ActiveRoot, ...]]:
@@ -145,15 +155,22 @@ class LoopFamily:
         array, (q,), and array, (q, k)
             ∂ det Δ/∂gj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
         """
-        delta = characteristic.matrix(self.plain, s)
-        lag = np.exp(-s * self.plain.max_delay)
-        # Rows cj(s): a gain on a delayed output sees it through exp(−sτ).
-        seen = np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen
-        delta = delta - np.einsum("nk,qkm->qnm", self.drive * gains, seen)
+        seen = self._seen(s)
+        delta = self.characteristic_matrix(s, gains)
         value = np.linalg.det(delta)
         response = np.linalg.inv(delta) @ self.drive
         slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
         return value, slopes
+
+    def _seen(self, s: ComplexArray) -> ComplexArray:
+        """Rows cj(s), (q, k, n): a gain on a delayed output sees it through exp(−sτ)."""
+        lag = np.exp(-s * self.plain.max_delay)
+        return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
+
+    def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
+        """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
+        fed_back = np.einsum("nk,qkm->qnm", self.drive * gains, self._seen(s))
+        return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""
@@ -190,8 +207,8 @@ def loop_family(
     left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
     factors = (*plain.factors[:-1], (left, right))
     if degree is None:
-        # Three more than suffices to start an iteration: here nothing is sharpened.
-        degree = degree_for(_largest(system, feedback), 0.0) + 3
+        # Two more than suffices to start an iteration on the characteristic equation.
+        degree = degree_for(_largest(system, feedback), 0.0) + 2
     base = generator_matrix(plain, degree, factors)
     size, n, rank = base.shape[0], system.order, right.shape[0]
     actuation = np.zeros((size, free.size))
@@ -214,6 +231,7 @@ def loop_family(
         actuation[:n],
         measure[(free % half) % shape[1]],
         free >= half,
+        degree,
     )
 
 

@@ -31,19 +31,22 @@ class Effort:
         Evaluations of each descent.
     sharpened : int
         Distinct ends that are sharpened on their active roots.
+    rounds : int
+        How often the configuration of active roots of an end is looked at again.
     """
 
     looked: int
     begun: int
     steps: int
     sharpened: int
+    rounds: int
 
 
 EFFORTS = {
-    1: Effort(16, 2, 25, 1),
-    2: Effort(32, 6, 40, 2),
-    3: Effort(128, 10, 80, 5),
-    4: Effort(256, 18, 80, 6),
+    1: Effort(16, 2, 25, 1, 1),
+    2: Effort(32, 5, 35, 2, 3),
+    3: Effort(128, 10, 80, 5, 4),
+    4: Effort(256, 18, 80, 6, 4),
 }
 
 
@@ -124,7 +127,7 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
         if len(sharp) == effort.sharpened or known:
             rest.append(basin)
             continue
-        better, used = improve(family, basin)
+        better, used = improve(family, basin, effort.rounds)
         evaluations += used
         sharp.append(better)
     everything = sorted([*sharp, *rest], key=lambda basin: basin.value)
@@ -143,7 +146,7 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     # The box is generous: many useful gains are small against it.
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
     inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
-    values = np.array([family.abscissa(point)[0] for point in points])
+    values = family.abscissas(points)
     order = np.argsort(values, kind="stable")
     deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
     placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
@@ -151,7 +154,7 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     return np.asarray(np.clip(chosen, inside[0], inside[1]))
 
 
-def improve(family: LoopFamily, basin: Basin, rounds: int = 4) -> tuple[Basin, int]:
+def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
     """Sharpen an end on every configuration of active roots that its spectrum suggests.
 
     Each success is looked at again: roots that have become active join the configuration.

@@ -40,7 +40,7 @@ def test_more_search_finds_nothing_lower_in_case2(groups):
     """Narrow basins of quadruple roots, which sampling alone misses."""
     loops = family("case2", *groups)
     found = global_search(loops).best
-    more = global_search(loops, seed=7, effort=Effort(512, 40, 120, 12)).best
+    more = global_search(loops, seed=7, effort=Effort(512, 40, 120, 12, 4)).best
     assert found.value <= more.value + 1e-6
 
 
