@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
+
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
 
@@ -44,6 +47,20 @@ def _matrix_and_derivative(
     return delta, slope
 
 
+def log_derivative_at(system: DelaySystem, s: complex) -> complex:
+    """Return `log_derivative` at a single point, with less overhead."""
+    slope: ComplexArray = np.eye(system.order, dtype=complex)
+    delta = s * slope - system.A0
+    for delay, delayed in zip(system.delays, system.delayed, strict=True):
+        term = cmath.exp(complex(min(-s.real * delay, _EXPONENT_LIMIT), -s.imag * delay)) * delayed
+        delta = delta - term
+        slope = slope + delay * term
+    try:
+        return complex((np.linalg.inv(delta) * slope.T).sum())
+    except np.linalg.LinAlgError:
+        return complex(np.inf)
+
+
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
     points = np.asarray(s, dtype=complex)
@@ -76,5 +93,6 @@ def magnitude_bound(system: DelaySystem, right_of: float) -> float:
 
 def perron_root(matrix: FloatArray) -> float:
     """Return the spectral radius of a nonnegative matrix, rounded outward."""
-    value = float(np.abs(np.linalg.eigvals(matrix)).max())
+    real, imag, _, _, info = dgeev(matrix, 0, 0)
+    value = float(np.hypot(real, imag).max()) if info == 0 else float(np.linalg.norm(matrix))
     return value * (1.0 + 1e-10) + 1e-300

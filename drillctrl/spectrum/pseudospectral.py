@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
@@ -97,6 +98,20 @@ def generator_matrix(
     return matrix
 
 
+def generator_eigenvalues(system: DelaySystem, degree: int) -> ComplexArray:
+    """Return the eigenvalues of the collocated generator in no order.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the QR iteration does not converge.
+    """
+    real, imag, _, _, info = dgeev(generator_matrix(system, degree), 0, 0, overwrite_a=1)
+    if info:
+        raise np.linalg.LinAlgError("eigenvalues did not converge")
+    return np.asarray(real + 1j * imag)
+
+
 def approximate_roots(system: DelaySystem, degree: int | None = None) -> ComplexArray:
     """Return the eigenvalues of the collocated generator, rightmost first.
 
@@ -108,5 +123,5 @@ def approximate_roots(system: DelaySystem, degree: int | None = None) -> Complex
         By default `degree_for` the imaginary axis.
     """
     degree = degree_for(system) if degree is None else degree
-    values = np.linalg.eigvals(generator_matrix(system, degree)).astype(complex)
+    values = generator_eigenvalues(system, degree)
     return values[np.argsort(-values.real, kind="stable")]

@@ -21,7 +21,7 @@ from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,
-    generator_matrix,
+    generator_eigenvalues,
 )
 
 BoolArray = npt.NDArray[np.bool_]
@@ -132,7 +132,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
     """Do for a single root what `polish` does for many, at half the cost."""
     last = math.inf
     for _ in range(24):
-        newton = 1.0 / complex(characteristic.log_derivative(system, np.complex128(s)))
+        newton = 1.0 / characteristic.log_derivative_at(system, s)
         step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
         size, scale = abs(step), 1.0 + abs(s)
         if size >= last and size < 1e-3 * scale:
@@ -165,7 +165,7 @@ def _gather(
     reach = characteristic.magnitude_bound(system, sure)
     degree = degree_for_reach(reach * system.max_delay)
     while True:
-        values = np.linalg.eigvals(generator_matrix(system, degree)).astype(complex)
+        values = generator_eigenvalues(system, degree)
         size = np.abs(values)
         # No root lies beyond the bound: what the collocation has there is its own.
         inside = values[(values.imag >= 0) & (size <= 1.1 * reach)]
@@ -177,7 +177,7 @@ def _gather(
                 reach = characteristic.magnitude_bound(system, sure)
                 degree = max(degree, degree_for_reach(reach * system.max_delay))
                 if inside.size == 0 or degree < MAX_DEGREE:
-                    values = np.linalg.eigvals(generator_matrix(system, degree)).astype(complex)
+                    values = generator_eigenvalues(system, degree)
                     inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
             floor = float(inside.real.max()) - depth
         # Starting values of a k-fold root are off by the k-th root of the error.
