@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Callable
@@ -63,6 +64,7 @@ def _point_options(command: Command) -> Command:
 def _output_options(command: Command) -> Command:
     """Add the options that say where results go."""
     options = [
+        click.option("--prove", is_flag=True, help="Prove the root count in ball arithmetic."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead."),
         click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json."),
         click.option("--plot", type=click.Path(), help="Draw the roots: FILE.png, .svg, .pdf."),
@@ -175,8 +177,14 @@ def _check_outputs(out: str | None, plot: str | None) -> None:
         check_figure_path(plot)
 
 
-def _deliver(result: Design, as_json: bool, out: str | None, plot: str | None) -> None:
-    text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+def _deliver(result: Design, prove: bool, as_json: bool, out: str | None, plot: str | None) -> None:
+    proof = result.prove() if prove else None
+    text = ""
+    if as_json or out is not None:
+        fields = result.to_dict()
+        if proof is not None:
+            fields["certificate"]["proof"] = dataclasses.asdict(proof)
+        text = json.dumps(fields, indent=2, allow_nan=False, ensure_ascii=False)
     if out is not None:
         from drillctrl.files import write_text
 
@@ -188,6 +196,12 @@ def _deliver(result: Design, as_json: bool, out: str | None, plot: str | None) -
         assert figure is not None
         _writing("--plot", plot, lambda: save_figure(figure, plot))
     click.echo(text if as_json else result.summary())
+    if proof is not None and not as_json:
+        counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
+        click.echo(
+            f"Proved: {counted} right of {proof.line:.6g}, "
+            f"{proof.segments} segments in {proof.precision}-bit balls"
+        )
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -222,6 +236,7 @@ def design_command(
     bound: tuple[str, ...],
     seed: int,
     require_stable: bool,
+    prove: bool,
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -239,7 +254,7 @@ def design_command(
     from drillctrl.designing import design
 
     result = design(where, structure, bounds=read_bounds(bound), seed=seed)
-    _deliver(result, as_json, out, plot)
+    _deliver(result, prove, as_json, out, plot)
     if require_stable and not result.stable:
         raise click.exceptions.Exit(NOT_STABILISED)
 
@@ -260,6 +275,7 @@ def analyze_command(
     m: int | None,
     order: int,
     require_stable: bool,
+    prove: bool,
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -278,7 +294,7 @@ def analyze_command(
 
     gains = read_gains("K1", k1), read_gains("K2", k2)
     result = analyze(where, structure, *gains, m=m, order=order)
-    _deliver(result, as_json, out, plot)
+    _deliver(result, prove, as_json, out, plot)
     if require_stable and not result.stable:
         raise click.exceptions.Exit(NOT_STABILISED)
 

@@ -34,6 +34,8 @@ from drillctrl.spectrum.characteristic import FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from drillctrl.spectrum.proof import Proof
+
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -121,6 +123,12 @@ class Design:
         K1, K2 = self.structure.gains(gains)
         result = _assess(self.point, self.rig_point, self.structure, K1, K2, None, DEFAULT_ORDER)
         return replace(result, elapsed_seconds=time.perf_counter() - began)
+
+    def prove(self) -> Proof:
+        """Prove the number of roots right of the certificate's line; see `prove_count`."""
+        from drillctrl.spectrum.proof import prove_count
+
+        return prove_count(self.system(), self.loop.certificate.line)
 
     def system(self) -> DelaySystem:
         """Return the closed loop."""

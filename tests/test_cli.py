@@ -136,6 +136,15 @@ def test_a_full_disk_leaves_the_old_file(capsys, tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["old.json"]
 
 
+def test_a_proof_on_request(capsys):
+    pytest.importorskip("flint")
+    status, out, _ = run(capsys, "analyze", "--prove", "--json")
+    certificate = json.loads(out)["certificate"]
+    assert status == 0
+    assert certificate["proof"]["count"] == certificate["counted"] == certificate["found"] == 3
+    assert "Proved: 3 root(s)" in run(capsys, "analyze", "--prove")[1]
+
+
 def test_every_verb_has_help_with_an_example(capsys):
     for verb in ("design", "analyze"):
         status, out, _ = run(capsys, verb, "--help")

@@ -9,14 +9,14 @@ from drillctrl import (
     preset_structure,
     spectral_abscissa,
 )
-from drillctrl.frequency_response import (
+from drillctrl.spectrum import characteristic
+from drillctrl.transfer import (
     frequency_grid,
     frequency_response,
     loop_frd,
     loop_transfer,
     to_frd,
 )
-from drillctrl.spectrum import characteristic
 
 GAINS = [-5.17], [5.06]
 
