@@ -88,7 +88,9 @@ class Controller:
             raise InputError("delay", self.delay, f"one of {', '.join(DELAYS)}")
         if self.delay == "current" and self.measurement_delay and self.period is None:
             raise InputError(
-                "measurement_delay", self.measurement_delay, "0 with delay = current, unless sampled"
+                "measurement_delay",
+                self.measurement_delay,
+                "0 with delay = current, unless sampled",
             )
         if self.rate_limit is not None and self.period is None and not self.actuator_lag:
             raise InputError(

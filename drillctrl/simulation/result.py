@@ -136,15 +136,24 @@ class Simulation:
     def __getstate__(self) -> dict[str, Any]:
         return {k: v for k, v in vars(self).items() if k != "_compiled"}
 
+    def _column(self, name: str) -> npt.NDArray[Any]:
+        """A column of the stored steps, by the name of its place in the kernel's data."""
+        data = kernel("data")
+        real = name in ("START", "LENGTH")
+        column: npt.NDArray[Any] = self._history["real" if real else "whole"][
+            :, getattr(data, name)
+        ]
+        return column
+
     @property
     def steps(self) -> int:
         """Number of accepted steps."""
-        return int(self._history["start"].size) - 1
+        return int(self._history["real"].shape[0]) - 1
 
     @functools.cached_property
     def times(self) -> FloatArray:
         """Ends of the integrator's own steps, from 0 on, shape (steps + 1,)."""
-        start, length = self._history["start"], self._history["length"]
+        start, length = self._column("START"), self._column("LENGTH")
         end = start[-1] + length[-1] if self.steps else 0.0
         return np.append(start[1:], end)
 
@@ -169,7 +178,7 @@ class Simulation:
         when = np.atleast_1d(np.asarray(times, dtype=float))
         if when.size and not (when.min() >= 0.0 and when.max() <= self.times[-1]):
             raise InputError("times", f"{when.min():g} to {when.max():g}", self._span())
-        places = np.searchsorted(self._history["start"], when, side="right") - 1
+        places = np.searchsorted(self._column("START"), when, side="right") - 1
         return self._evaluate(np.clip(places, 0 if self.steps == 0 else 1, self.steps), when)
 
     def _span(self) -> str:
@@ -180,7 +189,7 @@ class Simulation:
 
         At a jump both sides are there: the end of one step and the start of the next.
         """
-        start, length = self._history["start"], self._history["length"]
+        start, length = self._column("START"), self._column("LENGTH")
         first = max(1, int(np.searchsorted(start, since, side="right")) - 1)
         s = np.linspace(0.0, 1.0, per_step)
         grid = start[first:, None] + length[first:, None] * s
@@ -193,8 +202,8 @@ class Simulation:
         settings, history = self._compiled
         places = np.ascontiguousarray(places, dtype=np.int64)
         rows = kernel("sample").evaluate(settings, history, self.steps + 1, places, times)
-        stuck = self._history["torsion"][places] == data.STUCK
-        held = self._history["axial"][places] == data.HELD
+        stuck = self._column("TORSION")[places] == data.STUCK
+        held = self._column("AXIAL")[places] == data.HELD
         values = np.ascontiguousarray(rows.T)
         linear = self.model == "linear"
         return Motion(
@@ -221,16 +230,17 @@ class Simulation:
         axial = {data.HELD: "hold", data.DOWN: "advance", data.UP: "lift"}
         contact = {0: "loss", 1: "return"}
         found = []
-        h = self._history
+        start, on_rock = self._column("START"), self._column("CONTACT")
+        columns = {name: self._column(name.upper()) for name in ("contact", "torsion", "axial")}
         changed = np.zeros(self.steps + 1, dtype=bool)
-        for name in ("contact", "torsion", "axial"):
-            changed[2:] |= h[name][2:] != h[name][1:-1]
+        for column in columns.values():
+            changed[2:] |= column[2:] != column[1:-1]
         for j in np.flatnonzero(changed):
-            time = float(h["start"][j])
+            time = float(start[j])
             for name, names in (("contact", contact), ("torsion", torsion), ("axial", axial)):
-                now, before = int(h[name][j]), int(h[name][j - 1])
+                now, before = int(columns[name][j]), int(columns[name][j - 1])
                 # Off the rock there is no wear flat that could hold the bit.
-                meaningless = name == "axial" and not (h["contact"][j] and h["contact"][j - 1])
+                meaningless = name == "axial" and not (on_rock[j] and on_rock[j - 1])
                 if now != before and not meaningless:
                     found.append(Event(time, names[now]))
         return tuple(found)
@@ -244,9 +254,9 @@ class Simulation:
             Torsional stick, axial hold, loss of contact.
         """
         modes = {
-            "stuck": self._history["torsion"] == kernel("data").STUCK,
-            "held": self._history["axial"] == kernel("data").HELD,
-            "lost": self._history["contact"] == 0,
+            "stuck": self._column("TORSION") == kernel("data").STUCK,
+            "held": self._column("AXIAL") == kernel("data").HELD,
+            "lost": self._column("CONTACT") == 0,
         }
         if name not in modes:
             raise InputError("phase", name, f"one of {', '.join(modes)}")

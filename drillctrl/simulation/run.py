@@ -120,7 +120,7 @@ def simulate(
         used = int(standing.ints[march.STEPS])
         if outcome != data.MORE_ROOM or used > max_steps:
             break
-        room = min(2 * standing.history.start.size, max_steps + 2)
+        room = min(2 * standing.history.real.shape[0], max_steps + 2)
         standing = standing._replace(history=resized(standing.history, room, used))
     elapsed = time.perf_counter() - started
     history = resized(standing.history, used, used)

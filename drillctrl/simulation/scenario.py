@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -87,7 +88,7 @@ class Scenario:
             checked_number(f"initial {name}", value, -1e6, 1e6)
         changes = tuple(self.changes)
         object.__setattr__(self, "changes", changes)
-        for before, after in zip(changes, changes[1:], strict=False):
+        for before, after in itertools.pairwise(changes):
             if after.time < before.time + before.duration:
                 raise InputError("changes", after.time, "after the end of the change before")
 
@@ -116,8 +117,17 @@ class Scenario:
             if span > 0.0:
                 beyond = now[:2] - usual
                 rows.append(
-                    [start, offsets[0], beyond[0], slope[0], offsets[1], beyond[1], slope[1]]
-                    + [now[2], slope[2]]
+                    [
+                        start,
+                        offsets[0],
+                        beyond[0],
+                        slope[0],
+                        offsets[1],
+                        beyond[1],
+                        slope[1],
+                        now[2],
+                        slope[2],
+                    ]
                 )
                 offsets = offsets + span * (beyond + 0.5 * span * slope[:2])
             now, time = target, end

@@ -52,7 +52,10 @@ def settings_for(
     data = kernel("data")
     p = parameter_vector(point)
     a1, a2, b, _ = (value.full() for value in linearisation(dimensionless_plant())(p))
-    rows = linear_depth()(p).full()
+    linear_rows = np.zeros((5, 10))
+    linear_rows[:4] = np.hstack([a1, a2, b])
+    linear_rows[4, :8] = linear_depth()(p).full().ravel()
+    linear_rows[4, 8] = 2.0 * np.pi * point.delta0
     flags = np.zeros(7, dtype=np.int64)
     flags[data.LINEAR], flags[data.MULTIPLE] = linear, multiple
     control = np.zeros(5)
@@ -87,23 +90,18 @@ def settings_for(
             if past and not current:
                 lags[2] = controller.measurement_delay + point.delay
     return data.Settings(
-        p=p,
-        flags=flags,
-        control=control,
-        limit=limit,
-        rate=rate,
-        gain_times=times,
-        K1=np.ascontiguousarray(K1),
-        K2=np.ascontiguousarray(K2),
+        p=tuple(p.tolist()),
+        flags=tuple(flags.tolist()),
+        control=tuple(control.tolist()),
+        limit=tuple(limit.tolist()),
+        rate=tuple(rate.tolist()),
+        gains=np.column_stack([times, K1.reshape(-1, 8), K2.reshape(-1, 8)]),
         drive=scenario.drive(point),
-        A1=np.ascontiguousarray(a1),
-        A2=np.ascontiguousarray(a2),
-        B=np.ascontiguousarray(b),
-        depth_row=np.ascontiguousarray(rows),
-        lags=lags,
+        linear=linear_rows,
+        lags=tuple(lags.tolist()),
         noise=noise,
-        tolerance=np.array([rtol, atol]),
-        scale=_scales(point),
+        tolerance=(rtol, atol),
+        scale=tuple(_scales(point).tolist()),
     )
 
 
@@ -134,22 +132,8 @@ def _scales(point: OperatingPoint) -> FloatArray:
 def empty_history(room: int) -> Any:
     """Return a `History` with room for so many steps."""
     data = kernel("data")
-    whole = np.int64
-    return data.History(
-        start=np.zeros(room),
-        length=np.ones(room),
-        x=np.zeros((room, 6)),
-        theta=np.zeros((room, 6)),
-        actuator=np.zeros((room, 2, 4)),
-        held=np.zeros((room, 2)),
-        contact=np.zeros(room, whole),
-        torsion=np.zeros(room, whole),
-        axial=np.zeros(room, whole),
-        level=np.zeros(room, whole),
-        lag=np.zeros(room, whole),
-        face=np.zeros(room, whole),
-        passes=np.ones(room, whole),
-    )
+    real = np.zeros((room, data.REALS))
+    return data.History(real, np.zeros((room, data.WHOLES), dtype=np.int64))
 
 
 def resized(history: Any, room: int, used: int) -> Any:
@@ -175,32 +159,33 @@ def begin(point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool
     """
     data, march, switch = kernel("data"), kernel("march"), kernel("switch")
     history = empty_history(FIRST_ROOM)
+    before = history.real[0]
+    before[[data.START, data.LENGTH]] = -1.0, 1.0
     kick = scenario.perturbation()
     y = np.zeros(6)
     if scenario.start == "rest":
         if linear:
             raise InputError("start", "rest", "steady for the linear model")
-        y[[0, 2]] = branch_functions()[-1](settings.p).full().ravel()
-        history.x[0, :2] = y[0] + point.penetration_rate, -point.penetration_rate
-        history.theta[0, 0] = y[2]
+        y[[0, 2]] = branch_functions()[-1](np.array(settings.p)).full().ravel()
+        before[data.X : data.X + 2] = y[0] + point.penetration_rate, -point.penetration_rate
+        before[data.THETA] = y[2]
         y[[1, 3]] = -point.penetration_rate, -point.omega0
     y[:4] += kick
     if not linear and point.omega0 + y[3] < 0.0:
         low = -point.omega0 if scenario.start == "steady" else 0.0
         raise InputError("initial dtheta", kick[3], f"at least {low:g}: the bit must not turn back")
-    history.start[0] = -1.0
-    history.contact[0] = 1
+    history.whole[0, [data.CONTACT, data.PASSES]] = 1
     ints = np.zeros(march.LAG0 + 3, dtype=np.int64)
     reals = np.zeros(5)
     chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
     following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
-    ints[march.STEPS] = ints[march.CONTACT] = ints[march.PASSES] = 1
-    ints[march.LEVEL] = 0 if kick[0] or kick[2] else 1
+    ints[march.STEPS] = ints[march.I_CONTACT] = ints[march.I_PASSES] = 1
+    ints[march.I_LEVEL] = 0 if kick[0] or kick[2] else 1
     reals[march.STEP] = 1e-2 * point.delay
     reals[march.NEXT_SAMPLE] = settings.control[data.T_ON]
     standing = March(settings, history, ints, reals, y, chain, following)
     kernel("control").take_sample(settings, history, 1, ints, reals, 0.0)
     mode = march.mode_of(ints, reals, chain)
-    after = switch.next_mode(settings, history, 1, mode, data.START, 0.0, y)
+    after = switch.next_mode(settings, history, 1, mode, data.BEGIN, 0.0, y)
     march.enter(ints, after)
     return standing

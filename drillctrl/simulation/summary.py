@@ -109,9 +109,7 @@ def _share(simulation: Simulation, phase: str, since: float, end: float) -> floa
     return spent / (end - since)
 
 
-def _extreme(
-    simulation: Simulation, tail: Motion, name: str, *, least: bool = False
-) -> float:
+def _extreme(simulation: Simulation, tail: Motion, name: str, *, least: bool = False) -> float:
     """Extreme of a quantity, looked for again between the samples around the extreme one."""
     sign = -1.0 if least else 1.0
     values = sign * getattr(tail, name)

@@ -89,9 +89,7 @@ def translate(function: Any) -> str:
             raise NotImplementedError(f"CasADi operation {operation} in {function.name()}")
         lines.append(f"    w{targets[0]} = {value}")
     # Work places are used again after an output is taken, hence the o-variables.
-    result = ", ".join(
-        f"o{i}" if value != "0.0" else "0.0" for i, value in enumerate(outputs)
-    )
+    result = ", ".join(f"o{i}" if value != "0.0" else "0.0" for i, value in enumerate(outputs))
     arguments = ", ".join(f"i{i}" for i in range(len(sizes)))
     if len(outputs) > 1:
         result = f"({result})"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .data import LAST_LEVEL, MAX_FACE_LEVELS, MULTIPLE, STUCK
+from .data import CONTACT, LAST_LEVEL, LEVEL, MAX_FACE_LEVELS, MULTIPLE, STUCK
 from .interpolate import beyond, locate_angle, pitch_of, step_before_angle
 from .physics import rates
 
@@ -19,7 +19,7 @@ from .physics import rates
 def advance(history, steps, following, k, at):
     """Move ``following[k]`` to the first break after step ``at``; ``steps`` if none."""
     b = max(following[k], at + 1)
-    while b < steps and history.level[b] > LAST_LEVEL:
+    while b < steps and history.whole[b, LEVEL] > LAST_LEVEL:
         b += 1
     following[k] = b
     return b
@@ -97,7 +97,7 @@ def retrace(settings, history, steps, chain, following, t, theta, tolerance):
         b = min(max(b, start), steps - 1) if k == 0 else start
         j = step_before_angle(history, settings.p, b, t, theta, k * pitch, tolerance)
         chain[k], following[k], start = j, j + 1, j
-        if settings.flags[MULTIPLE] == 0 or history.contact[j] == 1:
+        if settings.flags[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
             return k + 1
     return MAX_FACE_LEVELS + 1
 

@@ -11,9 +11,12 @@ from .data import (
     DRIVE_T,
     FEEDBACK,
     FEEDBACK_DELAY,
+    LAG,
+    LENGTH,
     MEASURE_DELAY,
     PERIOD,
     SAMPLED,
+    START,
     T_ON,
 )
 from .interpolate import locate_angle, state_at, step_at
@@ -30,8 +33,8 @@ def next_clock(settings, ints, reals, t):
     if ints[PIECE] + 1 < settings.drive.shape[0]:
         goal = min(goal, settings.drive[ints[PIECE] + 1, DRIVE_T])
     if settings.flags[FEEDBACK] == 1:
-        if ints[GAINS] + 1 < settings.gain_times.shape[0]:
-            goal = min(goal, settings.gain_times[ints[GAINS] + 1])
+        if ints[GAINS] + 1 < settings.gains.shape[0]:
+            goal = min(goal, settings.gains[ints[GAINS] + 1, 0])
         if ints[ON] == 0:
             goal = min(goal, settings.control[T_ON])
         if settings.flags[SAMPLED] == 1:
@@ -43,7 +46,7 @@ def next_clock(settings, ints, reals, t):
 def state_then(settings, history, steps, time):
     """State at an instant that has passed."""
     j = step_at(history, steps, time)
-    return state_at(history, j, (time - history.start[j]) / history.length[j])
+    return state_at(history, j, (time - history.real[j, START]) / history.real[j, LENGTH])
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -70,7 +73,7 @@ def take_sample(settings, history, steps, ints, reals, t):
         due = True
     if settings.flags[FEEDBACK] == 0:
         return due
-    gains = piece_at(settings.gain_times, t)
+    gains = piece_at(settings.gains[:, 0], t)
     if gains != ints[GAINS]:
         ints[GAINS] = gains
         due = True
@@ -86,15 +89,15 @@ def take_sample(settings, history, steps, ints, reals, t):
     if settings.flags[CURRENT_DELAY] == 1:
         last = step_at(history, steps, t_now)
         j, s = locate_angle(
-            history, settings.p, steps, history.lag[last], t_now, state[2], 0.0
+            history, settings.p, steps, history.whole[last, LAG], t_now, state[2], 0.0
         )
-        lag = t_now - history.start[j] - s * history.length[j]
+        lag = t_now - history.real[j, START] - s * history.real[j, LENGTH]
     then = state_then(settings, history, steps, t_now - lag)
     earlier = k - int(np.rint(lag / period))
     now = measured(settings.drive, noisy(settings, k, state), t_now)
     then = measured(settings.drive, noisy(settings, earlier, then), t_now - lag)
     for i in range(2):
-        u = command(settings, ints[GAINS], now, then, i)
+        u = command(settings.gains, settings.limit[i], ints[GAINS], now, then, i)
         before = reals[HELD0 + i]
         if settings.flags[ACTUATOR] == 0:
             step = settings.rate[i] * period

@@ -17,7 +17,7 @@ DOWN, HELD, UP = 0, 1, 2
 TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2
 AXIAL_RATE, HELD_TO_UP, HELD_TO_DOWN, DEPTH = 3, 4, 5, 6
 KINDS = 7
-BARRIER, START = 7, 8
+BARRIER, BEGIN = 7, 8
 
 # How the march stopped.
 DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE = 0, 1, 2, 3, 4, 5
@@ -39,37 +39,39 @@ P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_U0, P_U1 = ra
 PROBES = 9
 
 
+# Columns of `History`.
+START, LENGTH, X, THETA, ACTUATORS, HELD_U, REALS = 0, 1, 2, 8, 14, 22, 24
+CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, WHOLES = range(8)
+
+
 class Settings(NamedTuple):
-    """What does not change during a run.
+    """What does not change during a run; tuples where arrays would cost a reference count.
 
     Attributes
     ----------
-    p : array, (9,)
+    p : tuple, (9,)
         Groups in the order of `PARAMETER_NAMES`.
-    flags : int array
+    flags : tuple of int
         LINEAR, MULTIPLE, FEEDBACK, ...
-    control : array
+    control : tuple
         T_ON, MEASURE_DELAY, ...
-    limit, rate : array, (2,)
+    limit, rate : tuple, (2,)
         Of each input, infinite where there is none.
-    gain_times : array, (g,)
-        From when each pair of gains holds.
-    K1, K2 : array, (g, 2, 4)
-        Gains on all states.
+    gains : array, (g, 17)
+        From when each set of gains holds; K1, then K2, by rows, on all states.
     drive : array, (m, 9)
         Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
-    A1, A2, B : array
-        Linear model.
-    depth_row : array, (2, 4)
-        Linear depth of cut beyond 2πδ0 from X and Xd.
-    lags : array, (3,)
+    linear : array, (5, 10)
+        A1, A2, B of the linear model side by side; below them the rows of the linear depth
+        of cut, and its steady value.
+    lags : tuple, (3,)
         Constant delays: of the linear model, of the measured and of the fed back signal; 0
         where there is none.
     noise : array, (k, 4)
         Added to the k-th sample of the states.
-    tolerance : array, (2,)
+    tolerance : tuple, (2,)
         rtol, atol.
-    scale : array, (7,)
+    scale : tuple, (7,)
         Size of each event function, to tell zero from rounding.
     """
 
@@ -78,14 +80,9 @@ class Settings(NamedTuple):
     control: Any
     limit: Any
     rate: Any
-    gain_times: Any
-    K1: Any
-    K2: Any
+    gains: Any
     drive: Any
-    A1: Any
-    A2: Any
-    B: Any
-    depth_row: Any
+    linear: Any
     lags: Any
     noise: Any
     tolerance: Any
@@ -97,36 +94,18 @@ class History(NamedTuple):
 
     Attributes
     ----------
-    start, length : array, (cap,)
-        Time at which a step starts, and how long it is.
-    x, theta : array, (cap, 6)
-        Coefficients of quintics in s = (t − start)/length.
-    actuator : array, (cap, 2, 4)
-        Coefficients of cubics, actuator states.
-    held : array, (cap, 2)
-        Output of a sampled controller.
-    contact, torsion, axial : int array, (cap,)
-        Mode.
-    level : int array, (cap,)
-        Level of the break at the start of a step.
-    lag, face, passes : int array, (cap,)
-        Step that holds t − τ at the start; step that left the rock face, and how many
-        blade pitches it lies back.
+    real : array, (cap, 24)
+        START: time at which a step starts; LENGTH; X, THETA: coefficients of quintics in
+        s = (t − start)/length; ACTUATORS: those of a cubic for each actuator; HELD_U: output
+        of a sampled controller.
+    whole : int array, (cap, 7)
+        CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
+        t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade
+        pitches it lies back.
     """
 
-    start: Any
-    length: Any
-    x: Any
-    theta: Any
-    actuator: Any
-    held: Any
-    contact: Any
-    torsion: Any
-    axial: Any
-    level: Any
-    lag: Any
-    face: Any
-    passes: Any
+    real: Any
+    whole: Any
 
 
 class Mode(NamedTuple):

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from .data import (
+    ACTUATORS,
     AXIAL_RATE,
     DEPTH,
     DOWN,
@@ -13,6 +14,7 @@ from .data import (
     HELD,
     HELD_TO_DOWN,
     HELD_TO_UP,
+    LENGTH,
     P_DEPTH,
     P_DOWN,
     P_FORWARD,
@@ -21,10 +23,11 @@ from .data import (
     PROBES,
     RELEASE_FORWARD,
     RELEASE_REVERSE,
+    START,
     STUCK,
     TORSION_RATE,
 )
-from .interpolate import state_at
+from .interpolate import cubic, state_at
 from .model import rate_of_change
 from .physics import rates
 
@@ -37,11 +40,11 @@ def watched(kind, mode):
     """Whether an event can end the present mode."""
     if kind == TORSION_RATE:
         return mode.torsion != STUCK
-    if kind == RELEASE_FORWARD or kind == RELEASE_REVERSE:
+    if kind in (RELEASE_FORWARD, RELEASE_REVERSE):
         return mode.torsion == STUCK
     if kind == AXIAL_RATE:
         return mode.contact == 1 and mode.axial != HELD
-    if kind == HELD_TO_UP or kind == HELD_TO_DOWN:
+    if kind in (HELD_TO_UP, HELD_TO_DOWN):
         return mode.contact == 1 and mode.axial == HELD
     return True
 
@@ -75,9 +78,8 @@ def value_on_step(settings, history, steps, mode, kind, s):
         for i in range(4):
             y[i] = state[i]
         for i in range(2):
-            c = history.actuator[steps, i]
-            y[4 + i] = c[0] + s * (c[1] + s * (c[2] + s * c[3]))
-        t = history.start[steps] + s * history.length[steps]
+            y[4 + i] = cubic(history.real, ACTUATORS + 4 * i, steps, s)
+        t = history.real[steps, START] + s * history.real[steps, LENGTH]
         rate_of_change(settings, history, steps, mode, t, y, np.empty(6), probe)
     return value_of(kind, mode, probe, state[1], state[3], settings.p)
 
@@ -146,9 +148,7 @@ def first_zero(settings, history, steps, mode, kind, stages):
         if value >= -tolerance:
             continue
         if left_value > 0.0:
-            return root_between(
-                settings, history, steps, mode, kind, left, left_value, s, value
-            )
+            return root_between(settings, history, steps, mode, kind, left, left_value, s, value)
         if i > 1:
             return left
         # It starts from zero: is it positive anywhere before?
@@ -161,6 +161,6 @@ def first_zero(settings, history, steps, mode, kind, stages):
                 )
             s, value = middle, middle_value
             if value >= -tolerance:
-                return NONE if s < 1e-6 else s
+                return 0.0 if s < 1e-6 else s
         return 0.0
     return NONE

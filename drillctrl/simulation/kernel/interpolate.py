@@ -4,66 +4,71 @@ from __future__ import annotations
 
 import numba
 
-from .data import LAST_LEVEL, STUCK
+from .data import LAST_LEVEL, LENGTH, LEVEL, START, STUCK, THETA, TORSION, X
 from .physics import rates, turned
 
 SOLVE_STEPS = 60
 
 
 @numba.njit(cache=True, error_model="numpy")
-def quintic(c, j, s):
-    """Value of row j of quintic coefficients at s."""
-    return c[j, 0] + s * (
-        c[j, 1] + s * (c[j, 2] + s * (c[j, 3] + s * (c[j, 4] + s * c[j, 5])))
+def quintic(c, n, j, s):
+    """Value at s of the quintic whose coefficients start in column n of row j."""
+    return c[j, n] + s * (
+        c[j, n + 1] + s * (c[j, n + 2] + s * (c[j, n + 3] + s * (c[j, n + 4] + s * c[j, n + 5])))
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def quintic_slope(c, j, s):
-    """Derivative in s of row j of quintic coefficients."""
-    return c[j, 1] + s * (
-        2.0 * c[j, 2] + s * (3.0 * c[j, 3] + s * (4.0 * c[j, 4] + s * 5.0 * c[j, 5]))
+def quintic_slope(c, n, j, s):
+    """Derivative in s of the quintic in row j."""
+    return c[j, n + 1] + s * (
+        2.0 * c[j, n + 2]
+        + s * (3.0 * c[j, n + 3] + s * (4.0 * c[j, n + 4] + s * 5.0 * c[j, n + 5]))
     )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def cubic(c, n, j, s):
+    """Value at s of the cubic whose coefficients start in column n of row j."""
+    return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * c[j, n + 3]))
 
 
 @numba.njit(cache=True, error_model="numpy")
 def state_at(history, j, s):
     """State (x, x', θ, θ') on step j at s."""
-    h = history.length[j]
+    c = history.real
+    h = c[j, LENGTH]
     return (
-        quintic(history.x, j, s),
-        quintic_slope(history.x, j, s) / h,
-        quintic(history.theta, j, s),
-        quintic_slope(history.theta, j, s) / h,
+        quintic(c, X, j, s),
+        quintic_slope(c, X, j, s) / h,
+        quintic(c, THETA, j, s),
+        quintic_slope(c, THETA, j, s) / h,
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def fit_quintic(c, j, h, value, rate, rate_end, increment, curve, curve_end):
+def fit_quintic(c, n, j, h, value, rate, rate_end, increment, curve, curve_end):
     """Quintic through value, rate and acceleration at both ends (Hermite).
 
     The increment is taken instead of the end value: it does not cancel for short steps.
     """
-    c[j, 0] = value
-    c[j, 1] = h * rate
-    c[j, 2] = 0.5 * h * h * curve
-    d = increment - c[j, 1] - c[j, 2]
-    e = h * rate_end - c[j, 1] - 2.0 * c[j, 2]
-    f = h * h * curve_end - 2.0 * c[j, 2]
-    c[j, 3] = 10.0 * d - 4.0 * e + 0.5 * f
-    c[j, 4] = -15.0 * d + 7.0 * e - f
-    c[j, 5] = 6.0 * d - 3.0 * e + 0.5 * f
+    first, second = h * rate, 0.5 * h * h * curve
+    d = increment - first - second
+    e = h * rate_end - first - 2.0 * second
+    f = h * h * curve_end - 2.0 * second
+    c[j, n], c[j, n + 1], c[j, n + 2] = value, first, second
+    c[j, n + 3] = 10.0 * d - 4.0 * e + 0.5 * f
+    c[j, n + 4] = -15.0 * d + 7.0 * e - f
+    c[j, n + 5] = 6.0 * d - 3.0 * e + 0.5 * f
 
 
 @numba.njit(cache=True, error_model="numpy")
-def fit_cubic(c, j, i, h, value, rate, rate_end, increment):
+def fit_cubic(c, n, j, h, value, rate, rate_end, increment):
     """Cubic through value and rate at both ends (Hermite)."""
-    c[j, i, 0] = value
-    c[j, i, 1] = h * rate
-    d = increment - c[j, i, 1]
-    e = h * (rate_end - rate)
-    c[j, i, 2] = 3.0 * d - e
-    c[j, i, 3] = e - 2.0 * d
+    d, e = increment - h * rate, h * (rate_end - rate)
+    c[j, n], c[j, n + 1] = value, h * rate
+    c[j, n + 2] = 3.0 * d - e
+    c[j, n + 3] = e - 2.0 * d
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -79,16 +84,16 @@ def beyond(history, p, j, s, t, theta, extra):
 
     ``extra`` is the lag in angle beyond 2π/n.
     """
-    delay = t - history.start[j] - s * history.length[j]
-    then = (0.0, 0.0, quintic(history.theta, j, s), 0.0)
+    delay = t - history.real[j, START] - s * history.real[j, LENGTH]
+    then = (0.0, 0.0, quintic(history.real, THETA, j, s), 0.0)
     return turned((0.0, 0.0, theta, 0.0), then, delay, p) - extra
 
 
 @numba.njit(cache=True, error_model="numpy")
 def angle_slope(history, p, j, s):
     """Angle turned per unit of s on step j."""
-    h = history.length[j]
-    rate = quintic_slope(history.theta, j, s) / h
+    h = history.real[j, LENGTH]
+    rate = quintic_slope(history.real, THETA, j, s) / h
     return h * rates((0.0, 0.0, 0.0, rate), p)[1]
 
 
@@ -104,16 +109,18 @@ def locate_angle(history, p, steps, j, t, theta, extra):
     j, s
         Step and place on it; j = -1 if the instant lies beyond the last step.
     """
-    while j > 0 and history.level[j] > LAST_LEVEL and (
-        beyond(history, p, j, 0.0, t, theta, extra) < 0.0
+    while (
+        j > 0
+        and history.whole[j, LEVEL] > LAST_LEVEL
+        and (beyond(history, p, j, 0.0, t, theta, extra) < 0.0)
     ):
         j -= 1
     after = beyond(history, p, j, 1.0, t, theta, extra)
     while (
         after > 0.0
         and j + 1 < steps
-        and history.level[j + 1] > LAST_LEVEL
-        and history.torsion[j + 1] != STUCK
+        and history.whole[j + 1, LEVEL] > LAST_LEVEL
+        and history.whole[j + 1, TORSION] != STUCK
     ):
         j += 1
         after = beyond(history, p, j, 1.0, t, theta, extra)
@@ -148,7 +155,8 @@ def locate_angle(history, p, steps, j, t, theta, extra):
             new = 0.5 * (low + high)
         change = abs(new - s)
         s = new
-        if change < 1e-13:
+        # Newton squares the error; near rest it is the relative one that counts.
+        if change <= 1e-7 * s or change < 1e-14:
             break
     return j, s
 
@@ -156,15 +164,15 @@ def locate_angle(history, p, steps, j, t, theta, extra):
 @numba.njit(cache=True, error_model="numpy")
 def locate_time(history, steps, j, time):
     """Find the step and s of an instant, searching from j within its smooth piece."""
-    while j > 0 and history.level[j] > LAST_LEVEL and time < history.start[j]:
+    while j > 0 and history.whole[j, LEVEL] > LAST_LEVEL and time < history.real[j, START]:
         j -= 1
     while (
         j + 1 < steps
-        and history.level[j + 1] > LAST_LEVEL
-        and time > history.start[j] + history.length[j]
+        and history.whole[j + 1, LEVEL] > LAST_LEVEL
+        and time > history.real[j, START] + history.real[j, LENGTH]
     ):
         j += 1
-    return j, (time - history.start[j]) / history.length[j]
+    return j, (time - history.real[j, START]) / history.real[j, LENGTH]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -173,7 +181,7 @@ def step_at(history, steps, time):
     low, high = 0, steps - 1
     while low < high:
         middle = (low + high + 1) // 2
-        if history.start[middle] <= time:
+        if history.real[middle, START] <= time:
             low = middle
         else:
             high = middle - 1
@@ -188,7 +196,7 @@ def step_before_angle(history, p, j, t, theta, extra, tolerance):
     """
     while j > 0 and beyond(history, p, j, 0.0, t, theta, extra) < -tolerance:
         j -= 1
-    while history.torsion[j] == STUCK or (
+    while history.whole[j, TORSION] == STUCK or (
         j > 0 and beyond(history, p, j, 1.0, t, theta, extra) >= -tolerance
     ):
         j += 1

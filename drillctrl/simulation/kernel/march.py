@@ -21,6 +21,8 @@ from .data import (
     CURRENT_DELAY,
     DONE,
     KINDS,
+    LENGTH,
+    LEVEL,
     LINEAR,
     MAX_FACE_LEVELS,
     MORE_ROOM,
@@ -30,8 +32,10 @@ from .data import (
     RATE_FEEDBACK,
     REVERSE,
     REVERSED,
+    START,
     STUCK,
     TOO_DEEP,
+    TORSION,
     Mode,
 )
 from .events import NONE, first_zero, value_on_step, watched
@@ -42,8 +46,8 @@ from .step import STAGE_COLUMNS, STAGES, attempt, record
 from .switch import next_mode, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
-(STEPS, CONTACT, TORSION, AXIAL, PASSES, LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS, REJECTED,
- EVALUATIONS, LAG0) = range(14)  # fmt: skip
+(STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
+ REJECTED, EVALUATIONS, LAG0) = range(14)  # fmt: skip
 TIME, STEP, HELD0, HELD1, NEXT_SAMPLE = range(5)
 REFINE = 6
 SHORTEST = 1e-14
@@ -52,11 +56,11 @@ SHORTEST = 1e-14
 @numba.njit(cache=True, error_model="numpy")
 def mode_of(ints, reals, chain):
     """Collect the present mode."""
-    passes = ints[PASSES]
+    passes = ints[I_PASSES]
     return Mode(
-        ints[CONTACT],
-        ints[TORSION],
-        ints[AXIAL],
+        ints[I_CONTACT],
+        ints[I_TORSION],
+        ints[I_AXIAL],
         chain[0],
         chain[passes - 1],
         passes,
@@ -74,7 +78,7 @@ def mode_of(ints, reals, chain):
 @numba.njit(cache=True, error_model="numpy")
 def enter(ints, branch):
     """Enter a branch."""
-    ints[CONTACT], ints[TORSION], ints[AXIAL] = branch
+    ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -87,7 +91,7 @@ def time_limits(settings, history, steps, ints, following, t):
             longest = min(longest, lag)
             b = advance(history, steps, following, MAX_FACE_LEVELS + i, ints[LAG0 + i])
             if b < steps:
-                nearest = min(nearest, history.start[b] + lag)
+                nearest = min(nearest, history.real[b, START] + lag)
     return nearest, longest
 
 
@@ -101,8 +105,8 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
             continue
         gain = 1 if i > 0 and settings.flags[RATE_FEEDBACK] == 1 else 2
         b = following[MAX_FACE_LEVELS + i]
-        while b < steps and history.start[b] + lag <= t:
-            level = min(level, history.level[b] + gain)
+        while b < steps and history.real[b, START] + lag <= t:
+            level = min(level, history.whole[b, LEVEL] + gain)
             ints[LAG0 + i] = b
             b = advance(history, steps, following, MAX_FACE_LEVELS + i, b)
         j, _ = locate_time(history, steps, ints[LAG0 + i], t - lag)
@@ -113,7 +117,7 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
 @numba.njit(cache=True, error_model="numpy")
 def refine(settings, history, steps, mode, kind, t, s, y, k, new, increment, stages, level):
     """Repeat the step so that it ends where an event function vanishes; return its length."""
-    h = s * history.length[steps]
+    h = s * history.real[steps, LENGTH]
     for _ in range(REFINE):
         attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
         record(settings, history, steps, mode, t, h, y, k, new, increment, level)
@@ -156,28 +160,29 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
     k, stages = np.zeros((STAGES, 6)), np.zeros((STAGES, STAGE_COLUMNS))
     new, increment, probe = np.zeros(6), np.zeros(6), np.zeros(PROBES)
     zero_rates = rates((0.0, 0.0, 0.0, 0.0), p)
+    known = False  # whether the rates at the start of the step are
     while True:
         t, steps = reals[TIME], ints[STEPS]
         if t >= end:
             return DONE
-        if steps + 1 >= history.start.shape[0]:
+        if steps + 1 >= history.real.shape[0]:
             return MORE_ROOM
-        if ints[TORSION] == REVERSE:
+        if ints[I_TORSION] == REVERSE:
             return REVERSED
         mode = mode_of(ints, reals, chain)
-        level = ints[LEVEL]
-        rate_of_change(settings, history, steps, mode, t, y, k[0], probe)
-        for i in range(PROBES):
-            stages[0, i] = probe[i]
-        stages[0, PROBES], stages[0, PROBES + 1] = y[1], y[3]
+        level = ints[I_LEVEL]
+        if not known:
+            rate_of_change(settings, history, steps, mode, t, y, k[0], probe)
+            for i in range(PROBES):
+                stages[0, i] = probe[i]
+            stages[0, PROBES], stages[0, PROBES + 1] = y[1], y[3]
+            known = True
 
         goal, longest = time_limits(settings, history, steps, ints, following, t)
         goal = min(goal, end, next_clock(settings, ints, reals, t))
         near, front = np.inf, np.inf
         if not linear:
-            near, front = angle_limits(
-                history, p, steps, mode, chain, following, t, y, k[0, 3]
-            )
+            near, front = angle_limits(history, p, steps, mode, chain, following, t, y, k[0, 3])
         h = min(reals[STEP], longest, front, max_step)
         aim = near <= 1.02 * h
         if aim:
@@ -213,9 +218,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         if not linear and mode.torsion != STUCK:
             size = 1.0 + abs(new[2]) + zero_rates[1] * abs(t)
             for _ in range(REFINE):
-                left, which = least_angle_left(
-                    history, p, steps, mode, following, t + h, new[2]
-                )
+                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
                 if abs(left) <= 4e-15 * size:
                     reached = which
                     break
@@ -232,9 +235,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 at_goal = False
                 attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
                 record(settings, history, steps, mode, t, h, y, k, new, increment, level)
-                left, which = least_angle_left(
-                    history, p, steps, mode, following, t + h, new[2]
-                )
+                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
             if reached < 0 and which >= 0 and left < -1e-9 * size:
                 reals[STEP] = 0.5 * h
                 ints[REJECTED] += 1
@@ -256,7 +257,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                     return COLLAPSE
                 snap(kind, y, p)
                 enter(ints, next_mode(settings, history, steps, mode, kind, t, y))
-                ints[LEVEL] = min(ints[LEVEL], 2)
+                ints[I_LEVEL] = min(ints[I_LEVEL], 2)
+                known = False
                 continue
             if where < 1.0:
                 h = refine(
@@ -280,14 +282,12 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         if reached >= 0:
             b = following[reached]
             gain = 1 if settings.flags[RATE_FEEDBACK] + settings.flags[CURRENT_DELAY] == 2 else 2
-            stuck = history.torsion[b] == STUCK
-            level = min(level, passed_on(history.level[b], stuck, gain))
+            stuck = history.whole[b, TORSION] == STUCK
+            level = min(level, passed_on(history.whole[b, LEVEL], stuck, gain))
             chain[reached] = b
             tolerance = 1e-13 * (1.0 + abs(y[2]) + zero_rates[1] * t)
-            ints[PASSES] = retrace(
-                settings, history, steps, chain, following, t, y[2], tolerance
-            )
-            if ints[PASSES] > MAX_FACE_LEVELS:
+            ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, y[2], tolerance)
+            if ints[I_PASSES] > MAX_FACE_LEVELS:
                 return TOO_DEEP
             follow(settings, history, steps, mode_of(ints, reals, chain), chain, t, y[2])
         if take_sample(settings, history, steps, ints, reals, t):
@@ -295,10 +295,15 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         if kind >= 0:
             snap(kind, y, p)
             level = 2
+        # The last stage is the first of the next step, unless something breaks there.
+        known = level == NO_BREAK and reached < 0
+        if known:
+            for i in range(6):
+                k[0, i] = k[STAGES - 1, i]
+            for i in range(STAGE_COLUMNS):
+                stages[0, i] = stages[STAGES - 1, i]
         mode = mode_of(ints, reals, chain)
         if kind >= 0 or level <= 2:
-            after = next_mode(
-                settings, history, steps, mode, kind if kind >= 0 else BARRIER, t, y
-            )
+            after = next_mode(settings, history, steps, mode, kind if kind >= 0 else BARRIER, t, y)
             enter(ints, after)
-        ints[LEVEL] = level
+        ints[I_LEVEL] = level

@@ -15,6 +15,7 @@ from .data import (
     FEEDBACK,
     HELD,
     LAG_TIME,
+    LENGTH,
     LINEAR,
     P_DELAY,
     P_DEPTH,
@@ -27,6 +28,7 @@ from .data import (
     P_UP,
     REVERSE,
     SAMPLED,
+    START,
     STUCK,
 )
 from .interpolate import locate_angle, locate_time, pitch_of, state_at
@@ -36,13 +38,22 @@ from .physics import acceleration, depth
 @numba.njit(cache=True, error_model="numpy")
 def top_at(drive, piece, t):
     """Motion of the top end beyond V0 t and Ω0 t: (x, θ) and their rates."""
-    row = drive[piece]
-    dt = t - row[DRIVE_T]
+    dt = t - drive[piece, DRIVE_T]
+    x, theta = DRIVE_X, DRIVE_THETA
     return (
-        row[DRIVE_X] + dt * (row[DRIVE_X + 1] + 0.5 * dt * row[DRIVE_X + 2]),
-        row[DRIVE_X + 1] + dt * row[DRIVE_X + 2],
-        row[DRIVE_THETA] + dt * (row[DRIVE_THETA + 1] + 0.5 * dt * row[DRIVE_THETA + 2]),
-        row[DRIVE_THETA + 1] + dt * row[DRIVE_THETA + 2],
+        drive[piece, x] + dt * (drive[piece, x + 1] + 0.5 * dt * drive[piece, x + 2]),
+        drive[piece, x + 1] + dt * drive[piece, x + 2],
+        drive[piece, theta] + dt * (drive[piece, theta + 1] + 0.5 * dt * drive[piece, theta + 2]),
+        drive[piece, theta + 1] + dt * drive[piece, theta + 2],
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def strength_at(drive, piece, t):
+    """Rock strength relative to the starting point's."""
+    return (
+        drive[piece, DRIVE_STRENGTH]
+        + (t - drive[piece, DRIVE_T]) * (drive[piece, DRIVE_STRENGTH + 1])
     )
 
 
@@ -58,18 +69,19 @@ def piece_at(times, t):
 @numba.njit(cache=True, error_model="numpy")
 def measured(drive, state, t):
     """State as the controller sees it: beyond what the top end has been told to do."""
+    if drive.shape[0] == 1:
+        return state
     k = piece_at(drive[:, DRIVE_T], t)
     top = top_at(drive, k, t)
     return (state[0] - top[0], state[1] - top[1], state[2] - top[2], state[3] - top[3])
 
 
 @numba.njit(cache=True, error_model="numpy")
-def command(settings, gains, now, then, i):
+def command(rows, limit, gains, now, then, i):
     """K1 Y + K2 Y_delayed for input i, within its limit (Eqs. 36, 38)."""
     u = 0.0
     for k in range(4):
-        u += settings.K1[gains, i, k] * now[k] + settings.K2[gains, i, k] * then[k]
-    limit = settings.limit[i]
+        u += rows[gains, 1 + 4 * i + k] * now[k] + rows[gains, 9 + 4 * i + k] * then[k]
     return min(max(u, -limit), limit)
 
 
@@ -77,8 +89,6 @@ def command(settings, gains, now, then, i):
 def inputs_at(settings, history, steps, mode, t, state, lagged):
     """Command of the controller at t."""
     flags = settings.flags
-    if flags[FEEDBACK] == 0 or mode.on == 0:
-        return 0.0, 0.0
     if flags[SAMPLED] == 1:
         return mode.held0, mode.held1
     now, t_now = state, t
@@ -96,8 +106,8 @@ def inputs_at(settings, history, steps, mode, t, state, lagged):
     now = measured(settings.drive, now, t_now)
     then = measured(settings.drive, then, t_then)
     return (
-        command(settings, mode.gains, now, then, 0),
-        command(settings, mode.gains, now, then, 1),
+        command(settings.gains, settings.limit[0], mode.gains, now, then, 0),
+        command(settings.gains, settings.limit[1], mode.gains, now, then, 1),
     )
 
 
@@ -128,25 +138,28 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     if j < 0:
         return False
     then = state_at(history, j, s)
-    delay = t - history.start[j] - s * history.length[j]
+    delay = t - history.real[j, START] - s * history.real[j, LENGTH]
     face, since = then, delay
     if mode.passes > 1:
         extra = (mode.passes - 1) * pitch_of(p)
         j, s = locate_angle(history, p, steps, mode.face, t, y[2], extra)
         face = state_at(history, j, s)
-        since = t - history.start[j] - s * history.length[j]
+        since = t - history.real[j, START] - s * history.real[j, LENGTH]
     d = depth(state, face, since, p)
     lagged = (then[0], then[1], then[2], then[3], delay)
-    wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
+    wanted = (0.0, 0.0)
+    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
+        wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
     u = wanted
     if settings.flags[ACTUATOR] == 1:
         u = (y[4], y[5])
         out[4] = actuate(settings, 0, wanted[0], y[4])
         out[5] = actuate(settings, 1, wanted[1], y[5])
-    row = settings.drive[mode.piece]
-    moved = top_at(settings.drive, mode.piece, t)
-    top = (moved[0], moved[2])
-    strength = row[DRIVE_STRENGTH] + (t - row[DRIVE_T]) * row[DRIVE_STRENGTH + 1]
+    top, strength = (0.0, 0.0), 1.0
+    if settings.drive.shape[0] > 1:
+        moved = top_at(settings.drive, mode.piece, t)
+        top = (moved[0], moved[2])
+        strength = strength_at(settings.drive, mode.piece, t)
     out[0], out[2] = y[1], y[3]
     probe[P_DEPTH], probe[P_DELAY], probe[P_U0], probe[P_U1] = d, delay, u[0], u[1]
     out[1], out[3] = branch_acceleration(
@@ -193,19 +206,22 @@ def linear_rate(settings, history, steps, mode, t, y, out, probe):
     then = state_at(history, j, s)
     state = (y[0], y[1], y[2], y[3])
     lagged = (then[0], then[1], then[2], then[3], settings.lags[0])
-    wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
+    wanted = (0.0, 0.0)
+    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
+        wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
     u = wanted
     if settings.flags[ACTUATOR] == 1:
         u = (y[4], y[5])
         out[4] = actuate(settings, 0, wanted[0], y[4])
         out[5] = actuate(settings, 1, wanted[1], y[5])
-    d = 0.0
+    rows = settings.linear
+    d = rows[4, 8]  # 2πδ0
     for i in range(4):
-        total = settings.B[i, 0] * u[0] + settings.B[i, 1] * u[1]
+        total = rows[i, 8] * u[0] + rows[i, 9] * u[1]
         for k in range(4):
-            total += settings.A1[i, k] * state[k] + settings.A2[i, k] * then[k]
+            total += rows[i, k] * state[k] + rows[i, 4 + k] * then[k]
         out[i] = total
-        d += settings.depth_row[0, i] * state[i] + settings.depth_row[1, i] * then[i]
+        d += rows[4, i] * state[i] + rows[4, 4 + i] * then[i]
     probe[P_DEPTH], probe[P_DELAY] = d, settings.lags[0]
     probe[P_U0], probe[P_U1], probe[P_PRESSED] = u[0], u[1], 1.0
     return True

@@ -9,7 +9,24 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .data import ACTUATOR, P_DEPTH, PROBES
+from .data import (
+    ACTUATOR,
+    ACTUATORS,
+    AXIAL,
+    CONTACT,
+    FACE,
+    HELD_U,
+    LAG,
+    LENGTH,
+    LEVEL,
+    P_DEPTH,
+    PASSES,
+    PROBES,
+    START,
+    THETA,
+    TORSION,
+    X,
+)
 from .interpolate import fit_cubic, fit_quintic
 from .model import rate_of_change
 
@@ -84,18 +101,24 @@ def attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages):
 def record(settings, history, j, mode, t, h, y, k, new, increment, level):
     """Write a step into place j of the history."""
     last = STAGES - 1
-    history.start[j], history.length[j] = t, h
-    fit_quintic(history.x, j, h, y[0], y[1], new[1], increment[0], k[0, 1], k[last, 1])
-    fit_quintic(history.theta, j, h, y[2], y[3], new[3], increment[2], k[0, 3], k[last, 3])
+    history.real[j, START], history.real[j, LENGTH] = t, h
+    fit_quintic(history.real, X, j, h, y[0], y[1], new[1], increment[0], k[0, 1], k[last, 1])
+    fit_quintic(history.real, THETA, j, h, y[2], y[3], new[3], increment[2], k[0, 3], k[last, 3])
     if settings.flags[ACTUATOR] == 1:
         for i in range(2):
             n = 4 + i
-            fit_cubic(history.actuator, j, i, h, y[n], k[0, n], k[last, n], increment[n])
-    history.held[j, 0], history.held[j, 1] = mode.held0, mode.held1
-    history.contact[j], history.torsion[j], history.axial[j] = (
+            fit_cubic(
+                history.real, ACTUATORS + 4 * i, j, h, y[n], k[0, n], k[last, n], increment[n]
+            )
+    history.real[j, HELD_U], history.real[j, HELD_U + 1] = mode.held0, mode.held1
+    history.whole[j, CONTACT], history.whole[j, TORSION], history.whole[j, AXIAL] = (
         mode.contact,
         mode.torsion,
         mode.axial,
     )
-    history.level[j] = level
-    history.lag[j], history.face[j], history.passes[j] = mode.lag, mode.face, mode.passes
+    history.whole[j, LEVEL] = level
+    history.whole[j, LAG], history.whole[j, FACE], history.whole[j, PASSES] = (
+        mode.lag,
+        mode.face,
+        mode.passes,
+    )

@@ -76,6 +76,7 @@ def next_mode(settings, history, steps, mode, kind, t, y):
         return 1, FORWARD, DOWN
     out, probe = np.empty(6), np.zeros(PROBES)
     axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.p)
+    push, turn = 1e-13 * settings.scale[HELD_TO_UP], 1e-13 * settings.scale[RELEASE_FORWARD]
     contact, torsion, axial = mode.contact, mode.torsion, mode.axial
     at_rest = torsion == STUCK or kind == TORSION_RATE or rotary_rate == 0.0
     if kind == DEPTH:
@@ -95,9 +96,9 @@ def next_mode(settings, history, steps, mode, kind, t, y):
         trial = with_branch(mode, 1, torsion if torsion == REVERSE else STUCK, HELD)
         rate_of_change(settings, history, steps, trial, t, y, out, probe)
         axial = HELD
-        if kind == HELD_TO_UP or (kind != HELD_TO_DOWN and probe[P_UP] < 0.0):
+        if kind == HELD_TO_UP or (kind != HELD_TO_DOWN and probe[P_UP] < -push):
             axial = UP
-        elif kind == HELD_TO_DOWN or probe[P_DOWN] > 0.0:
+        elif kind == HELD_TO_DOWN or probe[P_DOWN] > push:
             axial = DOWN
     else:
         axial = DOWN if axial_rate > 0.0 else UP
@@ -106,8 +107,8 @@ def next_mode(settings, history, steps, mode, kind, t, y):
     trial = with_branch(mode, contact, STUCK, axial)
     rate_of_change(settings, history, steps, trial, t, y, out, probe)
     torsion = STUCK
-    if kind == RELEASE_FORWARD or (kind != RELEASE_REVERSE and probe[P_FORWARD] > 0.0):
+    if kind == RELEASE_FORWARD or (kind != RELEASE_REVERSE and probe[P_FORWARD] > turn):
         torsion = FORWARD
-    elif kind == RELEASE_REVERSE or probe[P_REVERSE] < 0.0:
+    elif kind == RELEASE_REVERSE or probe[P_REVERSE] < -turn:
         torsion = REVERSE
     return contact, torsion, axial
