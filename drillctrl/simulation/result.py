@@ -19,6 +19,22 @@ from drillctrl.simulation.summary import Summary, summarise
 
 FloatArray = npt.NDArray[np.float64]
 Places = npt.NDArray[np.int64]
+MOTION_COLUMNS = (
+    "x",
+    "dx",
+    "theta",
+    "dtheta",
+    "ddx",
+    "ddtheta",
+    "delay",
+    "depth",
+    "pressed",
+    "weight_on_bit",
+    "torque_on_bit",
+    "axial",
+    "torque",
+    "contact",
+)
 
 
 class Event(NamedTuple):
@@ -204,15 +220,11 @@ class Simulation:
         rows = kernel("sample").evaluate(settings, history, self.steps + 1, places, times)
         stuck = self._column("TORSION")[places] == data.STUCK
         held = self._column("AXIAL")[places] == data.HELD
-        values = np.ascontiguousarray(rows.T)
-        linear = self.model == "linear"
-        return Motion(
-            times,
-            *values[:13],
-            contact=values[13] > 0.0,
-            stuck=stuck & (not linear),
-            held=held & (not linear),
-        )
+        nonlinear = self.model == "nonlinear"
+        values = dict(zip(MOTION_COLUMNS, np.ascontiguousarray(rows.T), strict=True))
+        on_rock = values.pop("contact") > 0.0
+        modes = {"contact": on_rock, "stuck": stuck & nonlinear, "held": held & nonlinear}
+        return Motion(times=times, **values, **modes)
 
     @functools.cached_property
     def steady_load(self) -> tuple[float, float]:

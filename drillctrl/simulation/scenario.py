@@ -116,19 +116,9 @@ class Scenario:
             slope = (target - now) / span if span > 0.0 else np.zeros(3)
             if span > 0.0:
                 beyond = now[:2] - usual
-                rows.append(
-                    [
-                        start,
-                        offsets[0],
-                        beyond[0],
-                        slope[0],
-                        offsets[1],
-                        beyond[1],
-                        slope[1],
-                        now[2],
-                        slope[2],
-                    ]
-                )
+                axial = [offsets[0], beyond[0], slope[0]]
+                torsional = [offsets[1], beyond[1], slope[1]]
+                rows.append([start, *axial, *torsional, now[2], slope[2]])
                 offsets = offsets + span * (beyond + 0.5 * span * slope[:2])
             now, time = target, end
 

@@ -116,7 +116,9 @@ def _noise(controller: Controller, duration: float) -> FloatArray:
     )
     if not deviation.any():
         return np.zeros((0, 4))
-    return np.random.default_rng(controller.seed).normal(size=(int(count), 4)) * deviation
+    generator = np.random.default_rng(controller.seed)
+    draws: FloatArray = deviation * generator.normal(size=(int(count), 4))
+    return draws
 
 
 def _scales(point: OperatingPoint) -> FloatArray:
