@@ -12,7 +12,7 @@ from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.setup import begin, resized, settings_for
+from drillctrl.simulation.setup import FIRST_ROOM, begin, resized, settings_for
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
@@ -105,7 +105,7 @@ def simulate(
         rtol=rtol,
         atol=atol,
     )
-    standing = begin(point, settings, scenario, linear)
+    standing = begin(point, settings, scenario, linear, room=min(FIRST_ROOM, max_steps + 2))
     march, data = kernel("march"), kernel("data")
     status = {
         data.DONE: "done",

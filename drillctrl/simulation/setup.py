@@ -148,7 +148,9 @@ def resized(history: Any, room: int, used: int) -> Any:
     return type(history)(*copies)
 
 
-def begin(point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool) -> March:
+def begin(
+    point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool, room: int = FIRST_ROOM
+) -> March:
     """Return a march that stands at t = 0.
 
     Before t = 0 there is step 0: steady drilling, or flat rock under a bit at rest (which
@@ -160,7 +162,7 @@ def begin(point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool
         If the bit would start turning backwards.
     """
     data, march, switch = kernel("data"), kernel("march"), kernel("switch")
-    history = empty_history(FIRST_ROOM)
+    history = empty_history(room)
     before = history.real[0]
     before[[data.START, data.LENGTH]] = -1.0, 1.0
     kick = scenario.perturbation()
