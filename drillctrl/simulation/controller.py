@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure, gain_matrices, structure
+from drillctrl.feedback import FeedbackStructure, gain_matrices, preset_structure
 from drillctrl.plant import INPUT_NAMES, STATE_NAMES
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,7 +26,7 @@ class Controller:
     Attributes
     ----------
     feedback : FeedbackStructure or str
-        Which states are fed back to which inputs; a name as in `drillctrl.feedback.structure`.
+        Which states are fed back to which inputs; a name as in `drillctrl.feedback.preset_structure`.
     K1, K2 : array_like, (m, p) or flat
         Gains on Y(t) and on Y(t − τ).
     activation : float
@@ -76,7 +76,7 @@ class Controller:
             object.__setattr__(self, name, value)
 
         if isinstance(self.feedback, str):
-            put("feedback", structure(self.feedback))
+            put("feedback", preset_structure(self.feedback))
         for name in ("activation", "measurement_delay", "actuator_lag"):
             put(name, checked_number(name, getattr(self, name), 0.0, 1e9))
         for name in ("limit", "rate_limit", "period"):
