@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         real_stability_radius,
         stability_radius,
     )
+    from drillctrl.simulation import Change, Controller, Scenario, Simulation, simulate
     from drillctrl.spectrum.batch import spectral_abscissas
     from drillctrl.spectrum.comparison import compare_spectra, intervals_for
     from drillctrl.spectrum.count import count_right_of
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     )
 
 _HOME = {
+    "Change": "simulation",
+    "Controller": "simulation",
     "DelaySystem": "delay_system",
     "Design": "designing",
     "FeedbackStructure": "feedback",
@@ -56,7 +59,9 @@ _HOME = {
     "Rig": "rig",
     "RigPoint": "operating_point",
     "Root": "spectrum.roots",
+    "Scenario": "simulation",
     "SemiDiscretization": "spectrum.semidiscretization",
+    "Simulation": "simulation",
     "SteadyState": "steady_state",
     "analyze": "designing",
     "analyze_loop": "analysis",
@@ -84,6 +89,7 @@ _HOME = {
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
     "semidiscretize": "spectrum.semidiscretization",
+    "simulate": "simulation",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
     "stability_radius": "robustness",
@@ -106,6 +112,8 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Change",
+    "Controller",
     "DelaySystem",
     "Design",
     "FeedbackStructure",
@@ -116,7 +124,9 @@ __all__ = [
     "Rig",
     "RigPoint",
     "Root",
+    "Scenario",
     "SemiDiscretization",
+    "Simulation",
     "SteadyState",
     "analyze",
     "analyze_loop",
@@ -144,6 +154,7 @@ __all__ = [
     "root_sensitivity",
     "save_rig",
     "semidiscretize",
+    "simulate",
     "spectral_abscissa",
     "spectral_abscissas",
     "stability_radius",

@@ -365,6 +365,7 @@ def simulate_command(
     _check_folder("--plot", plot)
     where = read_point(point)
     from drillctrl.simulation import Controller, simulate
+    from drillctrl.simulation.build import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
 
@@ -386,6 +387,8 @@ def simulate_command(
         controller = Controller(structure, gains[0], gains[1], activation=activation)
     elif k1 is not None or k2 is not None:
         raise InputError("--structure", "(missing)", "given together with gains")
+    if not is_compiled():
+        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     run = simulate(
         groups,
         controller,

@@ -73,12 +73,22 @@ def kernel(name: str) -> ModuleType:
     return importlib.import_module(f"{package}.{name}")
 
 
+def package_name(sources: dict[str, str]) -> str:
+    """Return the name of the generated package, which changes with any of its sources."""
+    text = "\0".join(f"{name}\0{source}" for name, source in sources.items())
+    return f"drillctrl_kernel_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+
+def is_compiled() -> bool:
+    """Whether an earlier run has left machine code in the cache."""
+    folder = cache_folder() / package_name(kernel_sources())
+    return any((folder / "__pycache__").glob("march*.nbc"))
+
+
 @functools.cache
 def _package() -> str:
     sources = kernel_sources()
-    text = "\0".join(f"{name}\0{source}" for name, source in sources.items())
-    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-    package = f"drillctrl_kernel_{digest}"
+    package = package_name(sources)
     folder = cache_folder() / package
     folder.mkdir(mode=0o700, exist_ok=True)
     for name, source in sources.items():

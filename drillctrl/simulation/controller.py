@@ -26,7 +26,7 @@ class Controller:
     Attributes
     ----------
     feedback : FeedbackStructure or str
-        Which states are fed back to which inputs; a name as in `drillctrl.feedback.preset_structure`.
+        Which states are fed back to which inputs; a name as in `preset_structure`.
     K1, K2 : array_like, (m, p) or flat
         Gains on Y(t) and on Y(t − τ).
     activation : float

@@ -33,13 +33,13 @@ def plot_motion(run: Simulation) -> Figure:
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(rows), 1, sharex=True)
     for ax, (label, values, colour) in zip(axes, rows, strict=True):
-        for i, (start, end) in enumerate(run.phases("stick")):
+        for i, (start, end) in enumerate(run.phases("stuck")):
             name = "torsional stick" if i == 0 else None
             ax.axvspan(start, end, color=GREY, alpha=0.25, linewidth=0, label=name)
         ax.plot(motion.times, values, color=colour, linewidth=0.9)
         ax.set_ylabel(label)
         ax.margins(x=0)
-    if run.phases("stick"):
+    if run.phases("stuck"):
         axes[0].legend(loc="upper left", fontsize="small")
     axes[-1].set_xlabel("dimensionless time t")
     axes[0].set_title(
