@@ -89,23 +89,18 @@ def test_pseudospectral_abscissa_crosses_zero_at_the_radius(loop):
     assert pseudospectral_abscissa(loop, 0.0) == spectral_abscissa(loop)
 
 
-@settings(max_examples=20)
-@given(st.integers(0, 10**6))
-def test_perturbed_roots_stay_left_of_the_pseudospectral_abscissa(loop, seed):
-    rng = np.random.default_rng(seed)
-    epsilon = 2e-4
-    noise = rng.normal(size=(4, 4))
-    noise *= epsilon * np.linalg.norm(loop.A0, 2) / np.linalg.norm(noise, 2)
-    shifted = spectral_abscissa(replace(loop, A0=loop.A0 + noise))
-    assert shifted <= BOUND[0] if BOUND else shifted < 0
-
-
-BOUND: list[float] = []
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _bound(loop):
-    BOUND.append(pseudospectral_abscissa(loop, 2e-4))
+def test_perturbed_roots_stay_left_of_the_pseudospectral_abscissa(loop):
+    epsilon, rng = 2e-4, np.random.default_rng(0)
+    limit = pseudospectral_abscissa(loop, epsilon)
+    reached = []
+    for _ in range(300):
+        noise = rng.normal(size=(4, 4))
+        noise *= epsilon * np.linalg.norm(loop.A0, 2) / np.linalg.norm(noise, 2)
+        reached.append(spectral_abscissa(replace(loop, A0=loop.A0 + noise)))
+    assert max(reached) <= limit
+    # The bound is not idle: random real noise in A0 alone comes a good part of the way.
+    alpha = spectral_abscissa(loop)
+    assert max(reached) - alpha > 0.1 * (limit - alpha)
 
 
 def test_delay_margin_of_a_scalar_equation():
