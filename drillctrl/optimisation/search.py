@@ -12,6 +12,7 @@ from drillctrl.optimisation.descent import bfgs
 from drillctrl.optimisation.explicit import explicit_candidates
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.roots import spectral_abscissa
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
@@ -166,8 +167,9 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
     int
         Evaluations used.
     """
-    used = 0
-    best = basin
+    # From here on abscissas are exact: the collocation's error is as large as what is gained.
+    used = 1
+    best = Basin(basin.gains, spectral_abscissa(family.loop(basin.gains)), ())
     tried: set[tuple[tuple[bool, int], ...]] = set()
     for _ in range(rounds):
         values = family.eigenvalues(best.gains)
@@ -180,7 +182,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
                     continue
                 tried.add(key)
                 sharp = sharpen(family, best.gains, best.value, roots)
-                value, _ = family.abscissa(sharp.gains)
+                value = spectral_abscissa(family.loop(sharp.gains))
                 used += sharp.evaluations + 1
                 # The conditions hold to rounding, of which the abscissa shows the k-th root.
                 blur = 1e-9 ** (1.0 / max(root.multiplicity for root in roots))
