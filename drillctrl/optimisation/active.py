@@ -17,7 +17,7 @@ import scipy.optimize
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
-_CIRCLES = {n: np.exp(2j * np.pi * np.arange(n) / n) for n in (8, 12)}
+_CIRCLES = {n: np.exp(2j * np.pi * np.arange(n) / n) for n in (12, 16)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ def _taylor(
     (terms,) and (terms, k).
     """
     # Aliasing falls with the power points − terms of the ratio of circle to scale.
-    points = 8 if terms <= 3 else 12
+    points = 12 if terms <= 3 else 16
     circle = _CIRCLES[points]
     determinant, slopes = family.determinant(s + _radius(s) * circle, gains)
     wave = circle[:, None] ** -np.arange(terms) / points

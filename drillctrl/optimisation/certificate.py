@@ -20,7 +20,7 @@ class OptimalityCertificate:
     Attributes
     ----------
     method : str
-        ``"multiple-root conditions"``: t is stationary under the conditions that keep the
+        ``"active-root conditions"``: t is stationary under the conditions that keep the
         active roots where they are. ``"Clarke subdifferential"``: the shortest convex
         combination of gradients of the active simple roots.
     stationarity : float
@@ -67,8 +67,8 @@ def certify_optimality(
     normals = [-np.eye(gains.size)[j] for j in np.flatnonzero(low)]
     normals += [np.eye(gains.size)[j] for j in np.flatnonzero(high)]
     roots = search.best.roots
-    if any(root.multiplicity > 1 for root in roots):
-        method = "multiple-root conditions"
+    if roots:
+        method = "active-root conditions"
         stationarity = _lagrange(family, gains, search.best.value, roots, normals)
     else:
         method = "Clarke subdifferential"

@@ -207,8 +207,8 @@ def loop_family(
     left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
     factors = (*plain.factors[:-1], (left, right))
     if degree is None:
-        # Two more than suffices to start an iteration on the characteristic equation.
-        degree = degree_for(_largest(system, feedback), 0.0) + 2
+        # Three more than suffices to start an iteration on the characteristic equation.
+        degree = degree_for(_largest(system, feedback), 0.0) + 3
     base = generator_matrix(plain, degree, factors)
     size, n, rank = base.shape[0], system.order, right.shape[0]
     actuation = np.zeros((size, free.size))
