@@ -160,22 +160,22 @@ class LoopFamily:
         array, (q,), and array, (q, k)
             ∂ det Δ/∂hj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
         """
-        seen = self._seen(s)
+        seen = self.seen_at(s)
         delta = self.characteristic_matrix(s, gains)
         value = np.linalg.det(delta)
         response = np.linalg.inv(delta) @ self.drive
         slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
         return value, slopes @ self.spread
 
-    def _seen(self, s: ComplexArray) -> ComplexArray:
-        """Rows cj(s), (q, c, n): a gain on a delayed output sees it through exp(−sτ)."""
+    def seen_at(self, s: ComplexArray) -> ComplexArray:
+        """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
         lag = np.exp(-s * self.plain.max_delay)
         return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
 
     def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
         """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
         drive = self.drive * (self.spread @ gains)
-        fed_back = np.einsum("nk,qkm->qnm", drive, self._seen(s))
+        fed_back = np.einsum("nk,qkm->qnm", drive, self.seen_at(s))
         return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
