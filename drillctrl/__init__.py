@@ -12,10 +12,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
     from drillctrl.delay_system import DelaySystem, plant_system
-    from drillctrl.designing import Design, analyze, design
+    from drillctrl.design_result import Design
+    from drillctrl.designing import analyze, design
     from drillctrl.errors import InputError
-    from drillctrl.feedback import FeedbackStructure, close_loop, preset_structure
+    from drillctrl.feedback import FeedbackStructure, Tie, close_loop, preset_structure
     from drillctrl.operating_point import OperatingPoint, RigPoint
+    from drillctrl.optimisation.objectives import (
+        Exact,
+        Requirements,
+        Robust,
+        SemiDiscrete,
+        WorstCase,
+    )
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
     from drillctrl.robustness import (
@@ -50,19 +58,25 @@ _HOME = {
     "Change": "simulation",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
-    "Design": "designing",
+    "Design": "design_result",
+    "Exact": "optimisation.objectives",
     "FeedbackStructure": "feedback",
     "InputError": "errors",
     "LoopAnalysis": "analysis",
     "OperatingPoint": "operating_point",
     "Plant": "plant",
+    "Requirements": "optimisation.objectives",
     "Rig": "rig",
     "RigPoint": "operating_point",
+    "Robust": "optimisation.objectives",
     "Root": "spectrum.roots",
     "Scenario": "simulation",
+    "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
     "SteadyState": "steady_state",
+    "Tie": "feedback",
+    "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
     "characteristic_roots": "spectrum.roots",
@@ -116,18 +130,24 @@ __all__ = [
     "Controller",
     "DelaySystem",
     "Design",
+    "Exact",
     "FeedbackStructure",
     "InputError",
     "LoopAnalysis",
     "OperatingPoint",
     "Plant",
+    "Requirements",
     "Rig",
     "RigPoint",
+    "Robust",
     "Root",
     "Scenario",
+    "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
     "SteadyState",
+    "Tie",
+    "WorstCase",
     "analyze",
     "analyze_loop",
     "characteristic_roots",
