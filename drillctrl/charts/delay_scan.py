@@ -18,7 +18,7 @@ from drillctrl.charts.scan import ScanLine
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
 # Lobes that are listed one by one; below the ω0 of the last one a bound decides.
-_MOST_TURNS = 400.0
+_FEWEST_TURNS, _MOST_TURNS = 6.0, 400.0
 
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -180,6 +180,27 @@ def unstable_without_delay(loops: Quasipolynomials) -> np.ndarray:
     return np.asarray((np.linalg.eigvals(companion).real > 0).sum(axis=1))
 
 
+def _far_enough(
+    omega: FloatArray, phase: FloatArray, direction: np.ndarray, base: int, limit: float
+) -> tuple[float, bool]:
+    """Return a delay up to which lobes are listed, and whether all beyond is unstable.
+
+    The count N(τ) grows at the mean rate Σ ± ω/π, and its ripple is at most one pair for
+    each critical frequency.
+    """
+    if not omega.size:
+        return limit, True
+    rate = float((direction * omega).sum()) / np.pi
+    turns = _FEWEST_TURNS
+    while True:
+        longest = min(limit, turns * 2.0 * math.pi / float(omega.max()))
+        floor = base + rate * longest - float((direction * phase).sum()) / np.pi
+        proved = rate > 0.0 and floor - 2.0 * direction.size > 0.0
+        if proved or longest >= limit or turns >= _MOST_TURNS:
+            return longest, proved
+        turns *= 2.0
+
+
 def scan_rotary_speed(
     loops: Quasipolynomials, positions: FloatArray, low: float, high: float, turn: float
 ) -> list[ScanLine]:
@@ -203,16 +224,12 @@ def scan_rotary_speed(
     for i, position in enumerate(positions):
         part = slice(bounds[i], bounds[i + 1])
         w, phi, sign = omega[part], phase[part], direction[part]
-        fastest = float(w.max()) if w.size else 1.0
-        longest = min(turn / low if low > 0.0 else math.inf, _MOST_TURNS * 2 * math.pi / fastest)
-        decided = low
-        if w.size and longest < (turn / low if low > 0.0 else math.inf):
-            # N(τ) grows at the mean rate Σ ± ω/π; its ripple is at most one pair each.
-            rate = float((sign * w).sum()) / np.pi
-            slack = float((sign * (w * longest - phi)).sum()) / np.pi - 2.0 * sign.size
-            decided = low if rate > 0.0 and base[i] + slack > 0.0 else turn / longest
-        elif not w.size:
-            longest = math.inf
+        limit = turn / low if low > 0.0 else math.inf
+        longest, decided = _far_enough(w, phi, sign, int(base[i]), limit)
+        if longest < limit:
+            decided = low if decided else turn / longest
+        else:
+            decided = low
         lobes = [np.arange(max(0, math.floor((a * longest - f) / (2 * np.pi)) + 1))
                  for a, f in zip(w, phi, strict=True)] if w.size else []
         if lobes:
