@@ -18,6 +18,18 @@ if TYPE_CHECKING:
     from drillctrl.operating_point import OperatingPoint, RigPoint
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
+    from drillctrl.robustness import (
+        delay_margin,
+        parameter_margin,
+        pseudospectral_abscissa,
+        real_stability_radius,
+        stability_radius,
+    )
+    from drillctrl.simulation import Change, Controller, Scenario, Simulation, simulate
+    from drillctrl.spectrum.batch import spectral_abscissas
+    from drillctrl.spectrum.comparison import compare_spectra, intervals_for
+    from drillctrl.spectrum.count import count_right_of
+    from drillctrl.spectrum.proof import prove_count
     from drillctrl.spectrum.roots import (
         Root,
         characteristic_roots,
@@ -25,9 +37,18 @@ if TYPE_CHECKING:
         spectral_abscissa,
     )
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
+    from drillctrl.spectrum.sensitivity import root_sensitivity
     from drillctrl.steady_state import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.transfer import (
+        frequency_response,
+        loop_frd,
+        loop_transfer,
+        to_frd,
+    )
 
 _HOME = {
+    "Change": "simulation",
+    "Controller": "simulation",
     "DelaySystem": "delay_system",
     "Design": "designing",
     "FeedbackStructure": "feedback",
@@ -38,25 +59,43 @@ _HOME = {
     "Rig": "rig",
     "RigPoint": "operating_point",
     "Root": "spectrum.roots",
+    "Scenario": "simulation",
     "SemiDiscretization": "spectrum.semidiscretization",
+    "Simulation": "simulation",
     "SteadyState": "steady_state",
     "analyze": "designing",
     "analyze_loop": "analysis",
     "characteristic_roots": "spectrum.roots",
     "close_loop": "feedback",
+    "compare_spectra": "spectrum.comparison",
+    "count_right_of": "spectrum.count",
+    "delay_margin": "robustness",
     "design": "designing",
     "dimensional_plant": "plant",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
+    "frequency_response": "transfer",
+    "intervals_for": "spectrum.comparison",
     "load_rig": "rig",
+    "loop_frd": "transfer",
+    "loop_transfer": "transfer",
+    "parameter_margin": "robustness",
     "plant_system": "delay_system",
     "preset_structure": "feedback",
+    "prove_count": "spectrum.proof",
+    "pseudospectral_abscissa": "robustness",
+    "real_stability_radius": "robustness",
     "rig_point_at_weight_on_bit": "steady_state",
+    "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
     "semidiscretize": "spectrum.semidiscretization",
+    "simulate": "simulation",
     "spectral_abscissa": "spectrum.roots",
+    "spectral_abscissas": "spectrum.batch",
+    "stability_radius": "robustness",
     "steady_state": "steady_state",
     "table1": "rig",
+    "to_frd": "transfer",
 }
 
 
@@ -73,6 +112,8 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Change",
+    "Controller",
     "DelaySystem",
     "Design",
     "FeedbackStructure",
@@ -83,23 +124,41 @@ __all__ = [
     "Rig",
     "RigPoint",
     "Root",
+    "Scenario",
     "SemiDiscretization",
+    "Simulation",
     "SteadyState",
     "analyze",
     "analyze_loop",
     "characteristic_roots",
     "close_loop",
+    "compare_spectra",
+    "count_right_of",
+    "delay_margin",
     "design",
     "dimensional_plant",
     "dimensionless_plant",
     "dominant_roots",
+    "frequency_response",
+    "intervals_for",
     "load_rig",
+    "loop_frd",
+    "loop_transfer",
+    "parameter_margin",
     "plant_system",
     "preset_structure",
+    "prove_count",
+    "pseudospectral_abscissa",
+    "real_stability_radius",
     "rig_point_at_weight_on_bit",
+    "root_sensitivity",
     "save_rig",
     "semidiscretize",
+    "simulate",
     "spectral_abscissa",
+    "spectral_abscissas",
+    "stability_radius",
     "steady_state",
     "table1",
+    "to_frd",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Callable
@@ -63,6 +64,7 @@ def _point_options(command: Command) -> Command:
 def _output_options(command: Command) -> Command:
     """Add the options that say where results go."""
     options = [
+        click.option("--prove", is_flag=True, help="Prove the root count in ball arithmetic."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead."),
         click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json."),
         click.option("--plot", type=click.Path(), help="Draw the roots: FILE.png, .svg, .pdf."),
@@ -162,11 +164,15 @@ def _writing(parameter: str, path: str, write: Callable[[], None]) -> None:
         ) from None
 
 
+def _check_folder(parameter: str, path: str | None) -> None:
+    if path is not None and not Path(path).absolute().parent.is_dir():
+        raise InputError(parameter, path, "in a folder that exists")
+
+
 def _check_outputs(out: str | None, plot: str | None) -> None:
     """Refuse bad file names before any work is done."""
-    for parameter, path in (("--out", out), ("--plot", plot)):
-        if path is not None and not Path(path).absolute().parent.is_dir():
-            raise InputError(parameter, path, "in a folder that exists")
+    _check_folder("--out", out)
+    _check_folder("--plot", plot)
     if out is not None and Path(out).suffix.lower() != ".json":
         raise InputError("--out", out, "a file that ends in .json")
     if plot is not None:
@@ -175,8 +181,14 @@ def _check_outputs(out: str | None, plot: str | None) -> None:
         check_figure_path(plot)
 
 
-def _deliver(result: Design, as_json: bool, out: str | None, plot: str | None) -> None:
-    text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+def _deliver(result: Design, prove: bool, as_json: bool, out: str | None, plot: str | None) -> None:
+    proof = result.prove() if prove else None
+    text = ""
+    if as_json or out is not None:
+        fields = result.to_dict()
+        if proof is not None:
+            fields["certificate"]["proof"] = dataclasses.asdict(proof)
+        text = json.dumps(fields, indent=2, allow_nan=False, ensure_ascii=False)
     if out is not None:
         from drillctrl.files import write_text
 
@@ -188,6 +200,12 @@ def _deliver(result: Design, as_json: bool, out: str | None, plot: str | None) -
         assert figure is not None
         _writing("--plot", plot, lambda: save_figure(figure, plot))
     click.echo(text if as_json else result.summary())
+    if proof is not None and not as_json:
+        counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
+        click.echo(
+            f"Proved: {counted} right of {proof.line:.6g}, "
+            f"{proof.segments} segments in {proof.precision}-bit balls"
+        )
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -222,6 +240,7 @@ def design_command(
     bound: tuple[str, ...],
     seed: int,
     require_stable: bool,
+    prove: bool,
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -239,7 +258,7 @@ def design_command(
     from drillctrl.designing import design
 
     result = design(where, structure, bounds=read_bounds(bound), seed=seed)
-    _deliver(result, as_json, out, plot)
+    _deliver(result, prove, as_json, out, plot)
     if require_stable and not result.stable:
         raise click.exceptions.Exit(NOT_STABILISED)
 
@@ -260,6 +279,7 @@ def analyze_command(
     m: int | None,
     order: int,
     require_stable: bool,
+    prove: bool,
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -278,9 +298,118 @@ def analyze_command(
 
     gains = read_gains("K1", k1), read_gains("K2", k2)
     result = analyze(where, structure, *gains, m=m, order=order)
-    _deliver(result, as_json, out, plot)
+    _deliver(result, prove, as_json, out, plot)
     if require_stable and not result.stable:
         raise click.exceptions.Exit(NOT_STABILISED)
+
+
+def read_initial(text: str) -> dict[str, float]:
+    """Return a perturbation from a text such as ``dx=1,dtheta=1``; empty for none."""
+    initial = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, _, value = part.partition("=")
+        try:
+            initial[name.strip()] = float(value)
+        except ValueError:
+            raise InputError("--initial", text, "of the form dx=1,dtheta=1") from None
+    return initial
+
+
+@cli.command(name="simulate")
+@_point_options
+@click.option("--structure", help="p, case1, pd or case2; without it, no control.")
+@click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
+@click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
+@click.option("--activation", type=float, default=0.0, help="Time at which control begins.")
+@click.option("--model", default="nonlinear", show_default=True, help="nonlinear or linear.")
+@click.option(
+    "--cutting",
+    default="multiple",
+    show_default=True,
+    help="Rock face: multiple (deepest of all passes) or single (the last pass).",
+)
+@click.option("--duration", type=float, default=200.0, show_default=True, help="Time units.")
+@click.option(
+    "--initial",
+    default="dx=1,dtheta=1",
+    show_default=True,
+    help="Perturbation of steady drilling: x, dx, theta, dtheta.",
+)
+@click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative error.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--out", type=click.Path(), help="Motion: FILE.csv, .npz or .parquet.")
+@click.option("--plot", type=click.Path(), help="Draw the motion: FILE.png, .svg, .pdf.")
+def simulate_command(
+    structure: str | None,
+    k1: str | None,
+    k2: str | None,
+    activation: float,
+    model: str,
+    cutting: str,
+    duration: float,
+    initial: str,
+    rtol: float,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **point: Any,
+) -> None:
+    """Try gains, or none, on the nonlinear drill string: stick, slip and bounce.
+
+    \b
+    Examples:
+      drillctrl simulate --omega0 10 --delta0 2.5 --psi 14 --duration 200 --plot motion.png
+      drillctrl simulate --delta0 2.5 --structure case1 --K1 -3.82 --K2 3.61 --out motion.csv
+    """
+    _check_folder("--out", out)
+    _check_folder("--plot", plot)
+    where = read_point(point)
+    from drillctrl.simulation import Controller, simulate
+    from drillctrl.simulation.build import is_compiled
+    from drillctrl.simulation.export import check_export_path, export_motion
+    from drillctrl.simulation.report import simulation_fields, simulation_summary
+
+    if out is not None:
+        check_export_path(out)
+    if plot is not None:
+        from drillctrl.plotting import check_figure_path
+
+        check_figure_path(plot)
+    from drillctrl.operating_point import RigPoint
+
+    rig_point = where if isinstance(where, RigPoint) else None
+    groups = where.operating_point() if isinstance(where, RigPoint) else where
+    controller = None
+    if structure is not None:
+        gains = read_gains("K1", k1), read_gains("K2", k2)
+        if gains[0] is None:
+            raise InputError("--K1", "(missing)", f"given for structure {structure}")
+        controller = Controller(structure, gains[0], gains[1], activation=activation)
+    elif k1 is not None or k2 is not None:
+        raise InputError("--structure", "(missing)", "given together with gains")
+    if not is_compiled():
+        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
+    run = simulate(
+        groups,
+        controller,
+        duration=duration,
+        initial=read_initial(initial),
+        model=model,
+        cutting=cutting,
+        rtol=rtol,
+    )
+    if out is not None:
+        _writing("--out", out, lambda: export_motion(run, out))
+    if plot is not None:
+        from drillctrl.plotting import save_figure
+        from drillctrl.simulation.plotting import plot_motion
+
+        figure = plot_motion(run)
+        _writing("--plot", plot, lambda: save_figure(figure, plot))
+    if as_json:
+        click.echo(json.dumps(simulation_fields(run), indent=2, allow_nan=False))
+    else:
+        click.echo(simulation_summary(run, rig_point))
 
 
 def main(arguments: list[str] | None = None) -> None:

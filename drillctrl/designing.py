@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,18 +16,25 @@ from drillctrl.analysis import (
     Fragility,
     LoopAnalysis,
     analyze_loop,
+    analyze_roots,
     fragility,
+    perturbed_plants,
 )
 from drillctrl.delay_system import DelaySystem, plant_system
-from drillctrl.errors import InputError, checked_integer
+from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.feedback import FeedbackStructure, close_loop, gain_matrices, preset_structure
 from drillctrl.operating_point import OperatingPoint, RigPoint
+from drillctrl.optimisation.alternative import robust_alternative
+from drillctrl.optimisation.certificate import OptimalityCertificate, certify_optimality
 from drillctrl.optimisation.family import loop_family
-from drillctrl.optimisation.search import multi_start
+from drillctrl.optimisation.rounding import hold_multiple_root
+from drillctrl.optimisation.search import global_search
 from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from drillctrl.spectrum.proof import Proof
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +53,8 @@ class Design:
         Gains on Y(t) and on Y(t − τ0).
     loop, open_loop : LoopAnalysis
         With and without the feedback.
-    fragility : Fragility or None
-        The closed loop when gains, rock or delay are a little off.
+    optimality : OptimalityCertificate or None
+        Evidence that no better gains lie within the bounds; None for given gains.
     evaluations : int
         Eigenvalue problems that the search solved; 0 for given gains.
     elapsed_seconds : float
@@ -60,7 +68,7 @@ class Design:
     K2: FloatArray
     loop: LoopAnalysis
     open_loop: LoopAnalysis
-    fragility: Fragility | None
+    optimality: OptimalityCertificate | None
     evaluations: int
     elapsed_seconds: float
 
@@ -69,10 +77,58 @@ class Design:
         """α of the closed loop, per unit of dimensionless time."""
         return self.loop.spectral_abscissa
 
+    @functools.cached_property
+    def fragility(self) -> Fragility | None:
+        """The closed loop when gains, rock or delay are a little off; None without feedback."""
+        if self.structure is None:
+            return None
+        return fragility(self.point, self.structure, self.K1, self.K2)
+
     @property
     def stable(self) -> bool:
         """Whether the closed loop is asymptotically stable."""
         return self.loop.stable
+
+    def robust_alternative(self, give_up: float = 0.05) -> Design:
+        """Return gains that decay almost as fast here, and faster when something is off.
+
+        Parameters
+        ----------
+        give_up : float
+            Share of the decay rate −α that may be lost, in (0, 1).
+
+        Returns
+        -------
+        Design
+            Within the same bounds, with α ≤ (1 − give_up) times this one's, the lowest
+            abscissa that was found for the worst of: nominal, ψ 5 % lower or higher, delay
+            2 % shorter or longer.
+
+        Raises
+        ------
+        InputError
+            If this design has no feedback or is not stable.
+        """
+        share = checked_number("give_up", give_up, 0.0, 1.0, open_low=True)
+        if self.structure is None or not self.stable:
+            raise InputError("design", "not a stabilised loop", "one, to have an alternative")
+        began = time.perf_counter()
+        family = loop_family(plant_system(self.point, self.structure.inputs), self.structure)
+        here = np.concatenate([self.K1.ravel(), self.K2.ravel()])[self.structure.free]
+        perturbed = [
+            loop_family(plant, self.structure, family.degree)
+            for plant in perturbed_plants(self.point, self.structure)
+        ]
+        gains = robust_alternative(family, perturbed, here, self.spectral_abscissa, share)
+        K1, K2 = self.structure.gains(gains)
+        result = _assess(self.point, self.rig_point, self.structure, K1, K2, None, DEFAULT_ORDER)
+        return replace(result, elapsed_seconds=time.perf_counter() - began)
+
+    def prove(self) -> Proof:
+        """Prove the number of roots right of the certificate's line; see `prove_count`."""
+        from drillctrl.spectrum.proof import prove_count
+
+        return prove_count(self.system(), self.loop.certificate.line)
 
     def system(self) -> DelaySystem:
         """Return the closed loop."""
@@ -157,12 +213,18 @@ def design(
     where, rig_point = _split_point(point)
     chosen = _as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
-    plant = plant_system(where, chosen.inputs)
-    search = multi_start(loop_family(plant, chosen), seed)
-    K1, K2 = chosen.gains(search.gains)
+    family = loop_family(plant_system(where, chosen.inputs), chosen)
+    search = global_search(family, seed)
+    gains = hold_multiple_root(family, search.best)
+    K1, K2 = chosen.gains(gains)
     result = _assess(where, rig_point, chosen, K1, K2, None, DEFAULT_ORDER)
     elapsed = time.perf_counter() - began
-    return replace(result, evaluations=search.evaluations, elapsed_seconds=elapsed)
+    return replace(
+        result,
+        optimality=certify_optimality(family, gains, search),
+        evaluations=search.evaluations,
+        elapsed_seconds=elapsed,
+    )
 
 
 def analyze(
@@ -221,9 +283,6 @@ def _assess(
     order: int,
 ) -> Design:
     """Analyse the loop that the gains close, beside the open loop."""
-    open_loop = analyze_loop(plant_system(point), m, order)
-    loop, off = open_loop, None
-    if feedback is not None:
-        loop = analyze_loop(closed_loop(point, feedback, K1, K2), m, order)
-        off = fragility(point, feedback, K1, K2)
-    return Design(point, rig_point, feedback, K1, K2, loop, open_loop, off, 0, 0.0)
+    loop = analyze_loop(closed_loop(point, feedback, K1, K2), m, order)
+    open_loop = loop if feedback is None else analyze_roots(plant_system(point))
+    return Design(point, rig_point, feedback, K1, K2, loop, open_loop, None, 0, 0.0)

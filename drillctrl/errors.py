@@ -25,7 +25,8 @@ class InputError(ValueError):
     """
 
     def __init__(self, parameter: str, value: object, permitted: str) -> None:
-        shown = value if isinstance(value, str) else repr(value)
+        plain = float(value) if isinstance(value, float) else value
+        shown = plain if isinstance(plain, str) else repr(plain)
         super().__init__(" ".join(f"{parameter} = {shown}: must be {permitted}".split()))
         self.parameter = parameter
         self.value = value

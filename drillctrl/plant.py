@@ -122,6 +122,32 @@ class BitRock(NamedTuple):
     torque_on_bit: Expression
 
 
+class Contact(NamedTuple):
+    """How the bit meets the rock: the arguments of Eq. 3 once its switches are decided.
+
+    Attributes
+    ----------
+    cut : expression
+        R(d) H(Φ'), depth of the rock that is being cut.
+    pressed : expression
+        H(d) H(Z'), share of the wear-flat force that acts; at Z' = 0 anything in [0, 1].
+    direction : expression
+        sgn(Φ'); at Φ' = 0 anything in [-1, 1].
+    """
+
+    cut: Expression
+    pressed: Expression
+    direction: Expression
+
+
+def contact_load(c: Coefficients, contact: Contact) -> BitRock:
+    """Return the bit-rock interaction (Eqs. 2, 3) on one branch of its switches."""
+    return BitRock(
+        c.cutting_force * contact.cut + c.wear_force * contact.pressed,
+        c.cutting_torque * contact.cut + c.wear_torque * contact.direction * contact.pressed,
+    )
+
+
 def bit_rock(
     c: Coefficients, depth: Expression, axial_rate: Expression, rotary_rate: Expression
 ) -> BitRock:
@@ -136,11 +162,50 @@ def bit_rock(
     axial_rate, rotary_rate : expression
         Z' and Φ', velocities of the bit.
     """
-    cutting = ramp(depth) * heaviside(rotary_rate)
-    contact = heaviside(depth) * heaviside(axial_rate)
-    return BitRock(
-        c.cutting_force * cutting + c.wear_force * contact,
-        c.cutting_torque * cutting + c.wear_torque * ca.sign(rotary_rate) * contact,
+    contact = Contact(
+        cut=ramp(depth) * heaviside(rotary_rate),
+        pressed=heaviside(depth) * heaviside(axial_rate),
+        direction=ca.sign(rotary_rate),
+    )
+    return contact_load(c, contact)
+
+
+class Kinematics(NamedTuple):
+    """What the bit did during the delay, and its velocities now.
+
+    Attributes
+    ----------
+    depth : expression
+        d, total depth of cut (Eqs. 7, 9).
+    turned : expression
+        Φ(t) − Φ(t − τ) (Eq. 8).
+    axial_rate, rotary_rate : expression
+        Z' and Φ'.
+    """
+
+    depth: Expression
+    turned: Expression
+    axial_rate: Expression
+    rotary_rate: Expression
+
+
+def kinematics(c: Coefficients, now: Any, then: Any, delay: Expression) -> Kinematics:
+    """Return depth of cut, angle turned and velocities (Eqs. 7-9).
+
+    Parameters
+    ----------
+    c : Coefficients
+        Speeds imposed at the top end, and number of blades.
+    now, then : record
+        Perturbations X(t) and X(t − τ) by name, as in `STATE_NAMES`.
+    delay : expression
+        τ.
+    """
+    return Kinematics(
+        depth=c.blades * (c.penetration_rate * delay + now.x - then.x),
+        turned=c.rotary_speed * delay + now.theta - then.theta,
+        axial_rate=c.penetration_rate + now.dx,
+        rotary_rate=c.rotary_speed + now.dtheta,
     )
 
 
@@ -249,23 +314,29 @@ def _named(names: tuple[str, ...]) -> tuple[ca.SX, Any]:
     return vector, record(*ca.vertsplit(vector))
 
 
+def _perturbed_motion(
+    c: Coefficients, now: Any, u: Any, load: BitRock, top: Any = None
+) -> tuple[Expression, Expression]:
+    """Return x'' and θ'': what the steady state balances is taken off both sides.
+
+    ``top`` is what the top end has moved beyond V0 t and Ω0 t, by name (x, theta).
+    """
+    excess = BitRock(*(a - b for a, b in zip(load, steady_load(c), strict=True)))
+    stretch = now.x if top is None else now.x - top.x
+    twist = now.theta if top is None else now.theta - top.theta
+    return equations_of_motion(
+        c._replace(weight=0.0), stretch, twist, now.dx, now.dtheta, excess, u.axial, u.torque
+    )
+
+
 def _plant(c: Coefficients, parameters: ca.SX, parameter_names: tuple[str, ...]) -> Plant:
     state, now = _named(STATE_NAMES)
     delayed_state, then = _named(STATE_NAMES)
     inputs, u = _named(INPUT_NAMES)
     delay = ca.SX.sym("tau")
-    axial_rate = c.penetration_rate + now.dx
-    rotary_rate = c.rotary_speed + now.dtheta
-    # Eqs. 7, 9 and 8: what the bit advanced and turned during the delay.
-    depth = c.blades * (c.penetration_rate * delay + now.x - then.x)
-    turned = c.rotary_speed * delay + now.theta - then.theta
-    load, steady = bit_rock(c, depth, axial_rate, rotary_rate), steady_load(c)
-    # Perturbation form: what the steady state balances is taken off both sides.
-    excess = BitRock(*(a - b for a, b in zip(load, steady, strict=True)))
-    balanced = c._replace(weight=0.0)
-    axial, angular = equations_of_motion(
-        balanced, now.x, now.theta, now.dx, now.dtheta, excess, u.axial, u.torque
-    )
+    bit = kinematics(c, now, then, delay)
+    load = bit_rock(c, bit.depth, bit.axial_rate, bit.rotary_rate)
+    axial, angular = _perturbed_motion(c, now, u, load)
     return Plant(
         state=state,
         delayed_state=delayed_state,
@@ -273,11 +344,57 @@ def _plant(c: Coefficients, parameters: ca.SX, parameter_names: tuple[str, ...])
         inputs=inputs,
         parameters=parameters,
         rhs=ca.vertcat(now.dx, axial, now.dtheta, angular),
-        delay_condition=turned - 2 * np.pi / c.blades,
+        delay_condition=bit.turned - 2 * np.pi / c.blades,
         steady_delay=steady_delay(c),
         state_names=STATE_NAMES,
         input_names=INPUT_NAMES,
         parameter_names=parameter_names,
+    )
+
+
+@functools.cache
+def branch_functions() -> tuple[ca.Function, ...]:
+    """Return the dimensionless model on one branch of its switches, for event-driven use.
+
+    Returns
+    -------
+    acceleration : Function
+        (X, u, top, contact, p) → (x'', θ''), with ``top`` the motion of the top end beyond
+        V0 t and Ω0 t, (x, θ), and ``contact`` a `Contact`.
+    load : Function
+        (contact, p) → weight and torque on bit.
+    depth, turned : Function
+        (X, Xd, τ, p) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8).
+    rates : Function
+        (X, p) → Z', Φ'.
+    rest : Function
+        p → x and θ of an unloaded bit at rest while the top end is at V0 t and Ω0 t.
+    """
+    parameters, point = _named(PARAMETER_NAMES)
+    state, now = _named(STATE_NAMES)
+    delayed_state, then = _named(STATE_NAMES)
+    inputs, u = _named(INPUT_NAMES)
+    top_vector, top = _named(("x", "theta"))
+    contact_vector, record = _named(Contact._fields)
+    delay = ca.SX.sym("tau")
+    c = dimensionless_coefficients(point)
+    bit = kinematics(c, now, then, delay)
+    load = contact_load(c, Contact(*record))
+    motion = _perturbed_motion(c, now, u, load, top)
+    angle = bit.turned - 2 * np.pi / c.blades
+    offsets = steady_offsets(c)
+    arguments = [state, delayed_state, delay, parameters]
+    return (
+        ca.Function(
+            "acceleration",
+            [state, inputs, top_vector, contact_vector, parameters],
+            [ca.vertcat(*motion)],
+        ),
+        ca.Function("load", [contact_vector, parameters], [ca.vertcat(*load)]),
+        ca.Function("depth", arguments, [bit.depth]),
+        ca.Function("turned", arguments, [angle]),
+        ca.Function("rates", [state, parameters], [ca.vertcat(bit.axial_rate, bit.rotary_rate)]),
+        ca.Function("rest", [parameters], [ca.vertcat(-offsets[0], -offsets[1])]),
     )
 
 
@@ -337,6 +454,24 @@ def linearisation(plant: Plant) -> ca.Function:
         ["parameters"],
         ["A1", "A2", "B", "tau0"],
     )
+
+
+@functools.cache
+def linear_depth() -> ca.Function:
+    """Return p → rows c1, c2 of the linear depth of cut 2πδ0 + c1 X + c2 Xd (Eqs. 17, 19)."""
+    parameters, point = _named(PARAMETER_NAMES)
+    state, now = _named(STATE_NAMES)
+    delayed_state, then = _named(STATE_NAMES)
+    delay = ca.SX.sym("tau")
+    c = dimensionless_coefficients(point)
+    bit = kinematics(c, now, then, delay)
+
+    def total(variable: ca.SX) -> ca.SX:
+        dtau = -ca.jacobian(bit.turned, variable) / ca.jacobian(bit.turned, delay)
+        return ca.jacobian(bit.depth, variable) + ca.jacobian(bit.depth, delay) @ dtau
+
+    rows = ca.densify(ca.vertcat(total(state), total(delayed_state)))
+    return ca.Function("linear_depth", [parameters], [rows])
 
 
 @functools.cache

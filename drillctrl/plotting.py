@@ -118,7 +118,8 @@ def plot_roots(design: Design, ax: Axes | None = None) -> Axes:
             ax.annotate(
                 f"{root.multiplicity} roots",
                 (root.real, root.imag),
-                xytext=(8, 8),
+                xytext=(-8, 8),
+                ha="right",
                 textcoords="offset points",
             )
     ax.legend(loc="best", fontsize="small")

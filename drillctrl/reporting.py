@@ -13,10 +13,13 @@ from drillctrl.analysis import LoopAnalysis
 from drillctrl.designing import Design
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import RigPoint
+from drillctrl.robustness import delay_margin, stability_radius
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import Root
 from drillctrl.steady_state import steady_state
 
+# Share of the decay rate that the alternative in the summary may lose.
+GIVE_UP = 0.05
 _SYMBOLS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'"}
 
 
@@ -46,12 +49,48 @@ def design_fields(design: Design) -> dict[str, Any]:
         "evaluations": design.evaluations,
         "elapsed_seconds": design.elapsed_seconds,
     }
+    if design.optimality is not None:
+        fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
     if design.fragility is not None:
         off = dataclasses.asdict(design.fragility)
-        fields["robustness"] = {"spectral_abscissa_with": off}
+        fields["robustness"] = {**_distance_fields(design), "spectral_abscissa_with": off}
+    if design.optimality is not None and design.stable:
+        fields["alternative"] = _alternative_fields(design)
     if design.rig_point is not None:
         fields["rig"] = _rig_fields(design.rig_point, design)
     return fields
+
+
+def _distance_fields(design: Design) -> dict[str, Any]:
+    radius = stability_radius(design.system())
+    fields: dict[str, Any] = {
+        "stability_radius": radius.value,
+        "stability_radius_lower_bound": radius.lower_bound,
+        "delay_margin": None,
+    }
+    if design.stable:
+        margin = delay_margin(design.system())
+        fields["delay_margin"] = {
+            "shorter": margin.shorter,
+            "longer": finite_or_none(margin.longer),
+        }
+    return fields
+
+
+def _alternative_fields(design: Design) -> dict[str, Any]:
+    other = design.robust_alternative(GIVE_UP)
+    assert other.fragility is not None
+    return {
+        "give_up": GIVE_UP,
+        "K1": other.K1.ravel().tolist(),
+        "K2": other.K2.ravel().tolist(),
+        "spectral_abscissa": other.spectral_abscissa,
+        "stable": other.stable,
+        "robustness": {
+            **_distance_fields(other),
+            "spectral_abscissa_with": dataclasses.asdict(other.fragility),
+        },
+    }
 
 
 def _bounds(structure: FeedbackStructure) -> dict[str, list[list[float]]]:
@@ -252,7 +291,42 @@ def _verdict_lines(design: Design) -> _Lines:
                 f"ρ(D) = {radius.value:.9f}, ln ρ/Δt = {radius.growth_rate:.6f}",
             )
         )
+    if design.optimality is not None:
+        best = design.optimality
+        text = f"{best.method}, residual {best.stationarity:.1g}"
+        if best.active_bounds:
+            text += f"; on a bound: {', '.join(best.active_bounds)}"
+        lines.append(("Optimal by", text))
+        text = f"{best.hits} descent(s) ended here, {best.basins} distinct end(s)"
+        if best.next_best is not None:
+            text += f", next best α = {best.next_best:.4f}"
+        lines.append(("", text))
+    if design.fragility is not None:
+        lines += _robustness_lines(design)
+    if design.optimality is not None and design.stable:
+        other = design.robust_alternative(GIVE_UP)
+        names = [*zip(("K1", "K2"), (other.K1, other.K2), strict=True)]
+        gains = "; ".join(
+            f"{name} = {', '.join(repr(float(g)) for g in matrix.ravel())}"
+            for name, matrix in names
+            if matrix.any()
+        )
+        lines.append(("", ""))
+        lines.append(("More robust", f"{gains}"))
+        lines.append(("", f"α = {_alpha(other.loop)}: at most {GIVE_UP:.0%} of the decay given up"))
+        lines += _robustness_lines(other)
+    return lines
+
+
+def _robustness_lines(design: Design) -> _Lines:
+    """Say how near instability is, and what small errors do."""
+    lines: _Lines = []
     off = design.fragility
+    if design.stable:
+        radius, margin = stability_radius(design.system()), delay_margin(design.system())
+        lines.append(("Margins", f"relative errors of the matrices below {radius.lower_bound:.2g}"))
+        longer = "any" if math.isinf(margin.longer) else f"{margin.longer:.4g}"
+        lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times τ0"))
     if off is not None:
         lines += [
             ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits"),

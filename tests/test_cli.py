@@ -106,6 +106,14 @@ BAD = [
     (["analyze", "--out", "/no/such/folder/a.json"], "--out = /no/such/folder/a.json"),
     (["analyze", "--plot", "roots.gif"], "plot = roots.gif"),
     (["analyze", "--nonsense"], "--nonsense"),
+    (["simulate", "--duration", "1e12"], "duration = 1000000000000.0"),
+    (["simulate", "--rtol", "-1"], "rtol = -1.0"),
+    (["simulate", "--initial", "dtheta=-20"], "initial dtheta = -20.0"),
+    (["simulate", "--initial", "dx"], "--initial = dx"),
+    (["simulate", "--structure", "case1", "--K1", "1,2", "--K2", "1"], "K1"),
+    (["simulate", "--K1", "1"], "--structure = (missing)"),
+    (["simulate", "--out", "motion.xls"], "out = motion.xls"),
+    (["simulate", "--model", "magic"], "model = magic"),
     (["invent"], "invent"),
 ]
 
@@ -136,8 +144,53 @@ def test_a_full_disk_leaves_the_old_file(capsys, tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["old.json"]
 
 
+def test_a_proof_on_request(capsys):
+    pytest.importorskip("flint")
+    status, out, _ = run(capsys, "analyze", "--prove", "--json")
+    certificate = json.loads(out)["certificate"]
+    assert status == 0
+    assert certificate["proof"]["count"] == certificate["counted"] == certificate["found"] == 3
+    assert "Proved: 3 root(s)" in run(capsys, "analyze", "--prove")[1]
+
+
+def test_simulate_writes_motion_and_figure(capsys, tmp_path):
+    table, figure = tmp_path / "motion.csv", tmp_path / "motion.png"
+    arguments = ["simulate", "--delta0", 2.5, "--duration", 150]
+    status, out, _ = run(capsys, *arguments, "--out", table, "--plot", figure)
+    assert status == 0
+    assert "torsional stick" in out
+    header, first = table.read_text().splitlines()[1:3]
+    assert header.startswith("times,x,dx,theta,dtheta,")
+    assert first.startswith("0.0,0.0,1.0,0.0,1.0,")
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    result = json.loads(run(capsys, *arguments, "--json")[1])
+    assert {
+        "settled", "stick_fraction", "period", "bit_speed_min", "bit_speed_max", "axial_min",
+        "axial_max", "delay_max", "max_abs_u", "lost_contact", "axial_stick_fraction", "events",
+        "steps", "elapsed_seconds",
+    } <= result.keys()  # fmt: skip
+    assert result["period"] == pytest.approx(7.78533, abs=1e-4)
+
+
+def test_simulate_with_control_and_npz(capsys, tmp_path):
+    import numpy as np
+
+    table = tmp_path / "motion.npz"
+    status, out, _ = run(
+        capsys, "simulate", "--omega0", 10, "--delta0", 12, "--model", "linear",
+        "--structure", "case2", "--K1", "-5.03,-4.91", "--K2", "-1.67,-0.31",
+        "--duration", 60, "--out", table, "--json",
+    )  # fmt: skip
+    result = json.loads(out)
+    assert status == 0
+    assert result["settled"]
+    assert result["max_abs_u"] == pytest.approx(4.91, abs=5e-3)
+    with np.load(table, allow_pickle=False) as columns:
+        assert np.abs(columns["x"]).max() == pytest.approx(2.71, abs=5e-3)
+
+
 def test_every_verb_has_help_with_an_example(capsys):
-    for verb in ("design", "analyze"):
+    for verb in ("design", "analyze", "simulate"):
         status, out, _ = run(capsys, verb, "--help")
         assert status == 0
         assert f"drillctrl {verb} --" in out

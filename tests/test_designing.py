@@ -7,10 +7,15 @@ from drillctrl import InputError, OperatingPoint, RigPoint, analyze, design, tab
 from drillctrl.spectrum.count import count_right_of
 
 
-def test_default_point_reaches_known_abscissas(point_c):
+def test_default_point_reaches_the_known_optima(point_c):
     case1, case2 = design(point_c, "case1"), design(point_c, "case2")
-    assert case1.spectral_abscissa <= -0.81
-    assert case2.spectral_abscissa <= -1.37
+    assert case1.spectral_abscissa == pytest.approx(-0.811927438342, abs=1e-8)
+    assert case1.K1[0, 0] == pytest.approx(-9.525113872, abs=1e-8)
+    assert case1.K2[0, 0] == pytest.approx(9.220013710, abs=1e-8)
+    assert case2.spectral_abscissa == pytest.approx(-1.392998065, abs=1e-8)
+    assert case2.K1.ravel() == pytest.approx([-9.861254902, 3.695722915], abs=1e-8)
+    assert case2.K2.ravel() == pytest.approx([10.0, -2.673320042], abs=1e-8)
+    assert case2.optimality.active_bounds == ("K2_1",)
     for result in (case1, case2):
         assert result.stable
         loop = result.system()
@@ -99,6 +104,30 @@ def test_missing_or_surplus_gains_are_refused(point_c, arguments, message):
 def test_other_objects_are_no_points():
     with pytest.raises(InputError, match="point = dict"):
         design({"omega0": 1})
+
+
+def test_the_alternative_is_better_when_something_is_off(point_c):
+    best = design(point_c, "case1")
+    other = best.robust_alternative(0.10)
+    assert other.spectral_abscissa <= 0.9 * best.spectral_abscissa + 1e-6
+    assert other.fragility.worst < best.fragility.worst
+    assert (np.abs(other.K1) <= 10).all()
+    with pytest.raises(InputError, match="give_up = 1.5"):
+        best.robust_alternative(1.5)
+    with pytest.raises(InputError, match="not a stabilised loop"):
+        analyze(point_c).robust_alternative()
+
+
+def test_both_designs_are_reported(point_c):
+    result = design(point_c, "case1")
+    fields = result.to_dict()
+    assert fields["alternative"]["give_up"] == 0.05
+    assert fields["alternative"]["stable"]
+    assert fields["robustness"]["stability_radius"] > 0
+    assert fields["robustness"]["delay_margin"]["longer"] > 1
+    assert fields["certificate"]["optimality"]["basins"] >= 1
+    assert "More robust" in result.summary()
+    json.dumps(fields, allow_nan=False)
 
 
 def test_roots_are_drawn(point_c):

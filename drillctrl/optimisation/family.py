@@ -5,12 +5,38 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
 from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
+from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ActiveRoot:
+    """A root that is taken to be rightmost.
+
+    Attributes
+    ----------
+    omega : float
+        Its imaginary part; 0 for a real root.
+    multiplicity : int
+        How often it is counted; a complex one implies its conjugate.
+    """
+
+    omega: float
+    multiplicity: int
+
+    @property
+    def equations(self) -> int:
+        """Number of real conditions."""
+        return self.multiplicity * (1 if self.omega == 0.0 else 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +58,14 @@ class LoopFamily:
         Columns bj.
     measurement : array, (k, q)
         Rows cjᵀ.
+    plain : DelaySystem
+        The loop with the fixed gains only.
+    drive, seen : array, (n, k) and (k, n)
+        The same columns and rows in the states of the plant.
+    late : bool array, (k,)
+        Which gains act on a delayed output.
+    degree : int
+        Of the collocation.
     """
 
     system: DelaySystem
@@ -39,6 +73,11 @@ class LoopFamily:
     base: FloatArray
     actuation: FloatArray
     measurement: FloatArray
+    plain: DelaySystem
+    drive: FloatArray
+    seen: FloatArray
+    late: BoolArray
+    degree: int
 
     def loop(self, gains: FloatArray) -> DelaySystem:
         """Return the closed loop at a gain vector."""
@@ -81,6 +120,58 @@ class LoopFamily:
             gradient = np.real(slopes / scale)
         return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
 
+    def abscissas(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated spectral abscissa at many gain vectors, (q, k) → (q,)."""
+        if len(gains) == 0:
+            return np.zeros(0)
+        stack = self.base + (self.actuation * gains[:, None, :]) @ self.measurement
+        return np.asarray(np.linalg.eigvals(stack).real.max(axis=1))
+
+    def active_gradients(
+        self, gains: FloatArray, width: float = 1e-6
+    ) -> tuple[FloatArray, tuple[ActiveRoot, ...]]:
+        """Return the gradients of all roots within ``width`` of the abscissa, (q, k)."""
+        values, left, right = scipy.linalg.eig(self.matrix(gains), left=True, right=True)
+        top = values.real.max()
+        active = np.flatnonzero((values.real > top - width * (1 + abs(top))) & (values.imag >= 0))
+        y, x = left[:, active].conj().T, right[:, active]
+        scale = np.einsum("qn,nq->q", y, x)
+        slopes = (y @ self.actuation) * (self.measurement @ x).T
+        roots = tuple(ActiveRoot(float(s.imag), 1) for s in values[active])
+        return np.real(slopes / scale[:, None]), roots
+
+    def determinant(self, s: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return det Δ(s) of the loop and its derivatives by the gains.
+
+        Parameters
+        ----------
+        s : array, (q,)
+            Points that are no roots.
+        gains : array, (k,)
+            The gain vector.
+
+        Returns
+        -------
+        array, (q,), and array, (q, k)
+            ∂ det Δ/∂gj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
+        """
+        seen = self._seen(s)
+        delta = self.characteristic_matrix(s, gains)
+        value = np.linalg.det(delta)
+        response = np.linalg.inv(delta) @ self.drive
+        slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
+        return value, slopes
+
+    def _seen(self, s: ComplexArray) -> ComplexArray:
+        """Rows cj(s), (q, k, n): a gain on a delayed output sees it through exp(−sτ)."""
+        lag = np.exp(-s * self.plain.max_delay)
+        return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
+
+    def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
+        """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
+        fed_back = np.einsum("nk,qkm->qnm", self.drive * gains, self._seen(s))
+        return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
+
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""
         values = np.linalg.eigvals(self.matrix(gains)).astype(complex)
@@ -116,7 +207,8 @@ def loop_family(
     left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
     factors = (*plain.factors[:-1], (left, right))
     if degree is None:
-        degree = max(4, degree_for(_largest(system, feedback), 0.0))
+        # Three more than suffices to start an iteration on the characteristic equation.
+        degree = degree_for(_largest(system, feedback), 0.0) + 3
     base = generator_matrix(plain, degree, factors)
     size, n, rank = base.shape[0], system.order, right.shape[0]
     actuation = np.zeros((size, free.size))
@@ -129,7 +221,18 @@ def loop_family(
         else:
             weights = np.linalg.lstsq(right.T, measure[source], rcond=None)[0]
             measurement[column, size - rank :] = weights
-    return LoopFamily(system, feedback, base, actuation, measurement)
+    return LoopFamily(
+        system,
+        feedback,
+        base,
+        actuation,
+        measurement,
+        plain,
+        actuation[:n],
+        measure[(free % half) % shape[1]],
+        free >= half,
+        degree,
+    )
 
 
 def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:

@@ -1,4 +1,4 @@
-"""Deterministic multi-start: many descents from points spread over the box."""
+"""Deterministic global search: descents from many starts, sharpened on their active roots."""
 
 from __future__ import annotations
 
@@ -7,37 +7,92 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from drillctrl.optimisation.descent import Descent, bfgs
-from drillctrl.optimisation.family import LoopFamily
+from drillctrl.optimisation.active import hypotheses, sharpen
+from drillctrl.optimisation.descent import bfgs
+from drillctrl.optimisation.explicit import explicit_candidates
+from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.roots import spectral_abscissa
 
-# Points that are looked at, descents begun, and descents finished, per number of gains.
-_STARTS = {0: (1, 1, 1), 1: (16, 4, 2), 2: (64, 8, 4), 3: (128, 16, 6), 4: (512, 32, 8)}
+# Relative distances up to which eigenvalues may be meant to coincide.
+_WIDTHS = (0.05, 0.2, 0.5)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to search.
+
+    Attributes
+    ----------
+    looked : int
+        Points of the box at which the abscissa is evaluated; a power of two.
+    begun : int
+        Descents begun at the best of them.
+    steps : int
+        Evaluations of each descent.
+    sharpened : int
+        Distinct ends that are sharpened on their active roots.
+    rounds : int
+        How often the configuration of active roots of an end is looked at again.
+    """
+
+    looked: int
+    begun: int
+    steps: int
+    sharpened: int
+    rounds: int
+
+
+EFFORTS = {
+    1: Effort(16, 2, 25, 1, 1),
+    2: Effort(32, 5, 35, 2, 3),
+    3: Effort(128, 10, 80, 5, 4),
+    4: Effort(256, 18, 80, 6, 4),
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """Result of a multi-start search.
+class Basin:
+    """Where one descent ended.
 
     Attributes
     ----------
     gains : array, (k,)
-        Best gain vector.
+        The gain vector.
     value : float
         Collocated spectral abscissa there.
-    ends : tuple of float
-        Values of the finished descents, best first.
-    evaluations : int
-        Eigenvalue problems solved.
+    roots : tuple of ActiveRoot
+        Active roots that it was sharpened on; empty if it was not.
     """
 
     gains: FloatArray
     value: float
-    ends: tuple[float, ...]
+    roots: tuple[ActiveRoot, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Result of a global search.
+
+    Attributes
+    ----------
+    best : Basin
+        The lowest end.
+    basins : tuple of Basin
+        Distinct ends, lowest first.
+    hits : int
+        How many descents ended in the lowest basin.
+    evaluations : int
+        Eigenvalue problems and root conditions solved.
+    """
+
+    best: Basin
+    basins: tuple[Basin, ...]
+    hits: int
     evaluations: int
 
 
-def multi_start(family: LoopFamily, seed: int = 0) -> Search:
+def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = None) -> Search:
     """Minimise the collocated abscissa over the box of the family's structure.
 
     Parameters
@@ -46,32 +101,107 @@ def multi_start(family: LoopFamily, seed: int = 0) -> Search:
         Loops to choose from.
     seed : int
         Scrambles the Sobol points; the same seed gives the same result.
+    effort : Effort, optional
+        By default according to the number of gains.
     """
     lower, upper = family.feedback.lower, family.feedback.upper
     count = lower.size
-    looked, begun, finished = _STARTS[min(count, 4)]
     if count == 0:
         value, _ = family.abscissa(lower)
-        return Search(lower, value, (value,), 1)
-    cube = qmc.Sobol(count, scramble=True, rng=seed).random(looked)
-    points = lower + (upper - lower) * (0.01 + 0.98 * cube)
-    # The box is wide; many useful gains are small against it.
-    points = np.vstack([points, 0.2 * points + 0.8 * np.clip(0.0, lower, upper)])
-    values = np.array([family.abscissa(point)[0] for point in points])
-    evaluations = len(points)
-    best = points[np.argsort(values, kind="stable")[:begun]]
-    descents: list[Descent] = []
-    for point in best:
-        descents.append(bfgs(family.abscissa, point, lower, upper, most=40 + 15 * count))
-    descents.sort(key=lambda end: end.value)
-    evaluations += sum(end.evaluations for end in descents)
+        only = Basin(lower, value, ())
+        return Search(only, (only,), 1, 1)
+    effort = EFFORTS[min(count, 4)] if effort is None else effort
+    starts = starting_points(family, seed, effort)
+    evaluations = 2 * effort.looked
     ends = []
-    for rough in descents[:finished]:
-        inside = lower + np.clip((rough.gains - lower) / (upper - lower), 1e-6, 1 - 1e-6) * (
-            upper - lower
-        )
-        fine = bfgs(family.abscissa, inside, lower, upper, most=150 * count)
-        evaluations += fine.evaluations
-        ends.append(min(rough, fine, key=lambda end: end.value))
-    ends.sort(key=lambda end: end.value)
-    return Search(ends[0].gains, ends[0].value, tuple(end.value for end in ends), evaluations)
+    for start in starts:
+        end = bfgs(family.abscissa, start, lower, upper, most=effort.steps)
+        evaluations += end.evaluations
+        ends.append(Basin(end.gains, end.value, ()))
+    ends.sort(key=lambda basin: basin.value)
+    sharp: list[Basin] = []
+    rest: list[Basin] = []
+    width = upper - lower
+    for i, basin in enumerate(ends):
+        # Another descent into the same corner teaches nothing.
+        known = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
+        if len(sharp) == effort.sharpened or known:
+            rest.append(basin)
+            continue
+        better, used = improve(family, basin, effort.rounds)
+        evaluations += used
+        sharp.append(better)
+    everything = sorted([*sharp, *rest], key=lambda basin: basin.value)
+    distinct = _distinct(everything)
+    best = distinct[0]
+    tolerance = 1e-6 * (1.0 + abs(best.value))
+    hits = sum(basin.value <= best.value + tolerance for basin in everything)
+    return Search(best, distinct, hits, evaluations)
+
+
+def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
+    """Return the best points of two Sobol sets, over the box and over its middle part."""
+    lower, upper = family.feedback.lower, family.feedback.upper
+    cube = qmc.Sobol(lower.size, scramble=True, rng=seed).random(effort.looked)
+    wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
+    # The box is generous: many useful gains are small against it.
+    points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
+    inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
+    values = family.abscissas(points)
+    order = np.argsort(values, kind="stable")
+    deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
+    placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
+    chosen = np.vstack([placed, points[order[: effort.begun - len(placed)]]])
+    return np.asarray(np.clip(chosen, inside[0], inside[1]))
+
+
+def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
+    """Sharpen an end on every configuration of active roots that its spectrum suggests.
+
+    Each success is looked at again: roots that have become active join the configuration.
+
+    Returns
+    -------
+    Basin
+        The best found; the given one if nothing is better.
+    int
+        Evaluations used.
+    """
+    # From here on abscissas are exact: the collocation's error is as large as what is gained.
+    used = 1
+    best = Basin(basin.gains, spectral_abscissa(family.loop(basin.gains)), ())
+    tried: set[tuple[tuple[bool, int], ...]] = set()
+    for _ in range(rounds):
+        values = family.eigenvalues(best.gains)
+        used += 1
+        improved = False
+        for width in _WIDTHS:
+            for roots in hypotheses(values, best.gains.size, width * (1.0 + abs(best.value))):
+                key = tuple((root.omega == 0.0, root.multiplicity) for root in roots)
+                if key in tried:
+                    continue
+                tried.add(key)
+                sharp = sharpen(family, best.gains, best.value, roots)
+                value = spectral_abscissa(family.loop(sharp.gains))
+                used += sharp.evaluations + 1
+                # The conditions hold to rounding, of which the abscissa shows the k-th root.
+                blur = 1e-9 ** (1.0 / max(root.multiplicity for root in roots))
+                converged = sharp.residual < 1e-9 and value < sharp.abscissa + blur
+                if converged and sharp.abscissa < best.value - 1e-12:
+                    best = Basin(sharp.gains, sharp.abscissa, sharp.roots)
+                    improved = True
+                elif value < best.value - 1e-9:
+                    best = Basin(sharp.gains, value, ())
+                    improved = True
+        if not improved:
+            break
+    return best, used
+
+
+def _distinct(basins: list[Basin]) -> tuple[Basin, ...]:
+    kept: list[Basin] = []
+    for basin in basins:
+        tolerance = 1e-4 * (1.0 + abs(basin.value))
+        if all(abs(basin.value - other.value) > tolerance for other in kept):
+            kept.append(basin)
+    return tuple(kept)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
+
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
 
@@ -17,32 +20,53 @@ _EXPONENT_LIMIT = 300.0
 
 def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return Δ(s) for every s, shape (..., n, n)."""
-    points = np.asarray(s, dtype=complex)[..., None, None]
-    delta = points * np.eye(system.order) - system.A0
-    for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        delta -= (
-            np.exp(np.minimum(-points.real * delay, _EXPONENT_LIMIT))
-            * np.exp(-1j * delay * points.imag)
-            * delayed
-        )
-    return np.asarray(delta, dtype=complex)
+    return _matrix_and_derivative(system, np.asarray(s, dtype=complex), with_derivative=False)[0]
 
 
 def derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return dΔ/ds for every s, shape (..., n, n)."""
-    points = np.asarray(s, dtype=complex)[..., None, None]
-    slope = np.broadcast_to(np.eye(system.order), (*points.shape[:-2], *system.A0.shape)) + 0j
+    return _matrix_and_derivative(system, np.asarray(s, dtype=complex))[1]
+
+
+def _matrix_and_derivative(
+    system: DelaySystem, points: ComplexArray, with_derivative: bool = True
+) -> tuple[ComplexArray, ComplexArray]:
+    points = points[..., None, None]
+    identity = np.eye(system.order)
+    delta = points * identity - system.A0
+    slope = np.zeros_like(delta)
+    if with_derivative:
+        slope += identity
     for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        slope = slope + delay * np.exp(-points * delay) * delayed
-    return np.asarray(slope, dtype=complex)
+        exponent = -delay * points
+        np.minimum(exponent.real, _EXPONENT_LIMIT, out=exponent.real)
+        term = np.exp(exponent) * delayed
+        delta -= term
+        if with_derivative:
+            slope += delay * term
+    return delta, slope
+
+
+def log_derivative_at(system: DelaySystem, s: complex) -> complex:
+    """Return `log_derivative` at a single point, with less overhead."""
+    slope: ComplexArray = np.eye(system.order, dtype=complex)
+    delta = s * slope - system.A0
+    for delay, delayed in zip(system.delays, system.delayed, strict=True):
+        term = cmath.exp(complex(min(-s.real * delay, _EXPONENT_LIMIT), -s.imag * delay)) * delayed
+        delta = delta - term
+        slope = slope + delay * term
+    try:
+        return complex((np.linalg.inv(delta) * slope.T).sum())
+    except np.linalg.LinAlgError:
+        return complex(np.inf)
 
 
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
     points = np.asarray(s, dtype=complex)
-    delta, slope = matrix(system, points), derivative(system, points)
+    delta, slope = _matrix_and_derivative(system, points)
     try:
-        solved = np.linalg.solve(delta, slope)
+        inverse = np.linalg.inv(delta)
     except np.linalg.LinAlgError:
         # An s that is a root to the last bit: leave it where it is.
         values = np.full(points.shape, np.inf + 0j)
@@ -52,7 +76,7 @@ def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
             except np.linalg.LinAlgError:
                 continue
         return values
-    return np.asarray(np.einsum("...ii->...", solved))
+    return np.asarray(np.einsum("...ij,...ji->...", inverse, slope))
 
 
 def magnitude_bound(system: DelaySystem, right_of: float) -> float:
@@ -69,5 +93,6 @@ def magnitude_bound(system: DelaySystem, right_of: float) -> float:
 
 def perron_root(matrix: FloatArray) -> float:
     """Return the spectral radius of a nonnegative matrix, rounded outward."""
-    value = float(np.abs(np.linalg.eigvals(matrix)).max())
+    real, imag, _, _, info = dgeev(matrix, 0, 0)
+    value = float(np.hypot(real, imag).max()) if info == 0 else float(np.linalg.norm(matrix))
     return value * (1.0 + 1e-10) + 1e-300

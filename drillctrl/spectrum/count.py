@@ -12,9 +12,10 @@ import numpy as np
 
 from drillctrl.delay_system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 
-_LARGEST_TURN = 0.8
+_LARGEST_STEP = 1.2
+_LARGEST_SURPRISE = 0.5
 _MAX_POINTS = 200_000
 
 
@@ -40,20 +41,15 @@ class RootCount:
     points: int
 
 
-def _determinant(system: DelaySystem, line: float, omega: FloatArray) -> np.ndarray:
-    """Return det Δ(line + iω) / |s + height|^n, so that nothing overflows."""
-    s = line + 1j * omega
-    delta = characteristic.matrix(system, s) / (1.0 + np.abs(s))[:, None, None]
-    return np.asarray(np.linalg.det(delta))
-
-
-def count_right_of(system: DelaySystem, line: float, hints: FloatArray | None = None) -> RootCount:
+def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 
     For |s| above the Perron bound ρ each eigenvalue of I − M(s)/s turns by less than
     asin(ρ/|s|), so det Δ(s)/sⁿ stays in the right half-plane beyond ρ/sin(π/2n) and the
     contour closes at infinity without further evaluation. Below, steps are halved until
-    det Δ turns by less than 0.8 rad in each.
+    the logarithmic derivative of det Δ, at both ends, limits the turn, and the turn is what
+    it predicts. Roots close to the line, several of them too, make the derivative large on
+    either side and so cannot slip through between two points.
 
     Parameters
     ----------
@@ -61,37 +57,50 @@ def count_right_of(system: DelaySystem, line: float, hints: FloatArray | None = 
         Any.
     line : float
         Re s of the line.
-    hints : array, optional
-        Imaginary parts near which roots lie close to the line.
     """
     n = system.order
     height = magnitude_bound(system, line) / math.sin(math.pi / (2 * n)) * 1.001 + 1e-9
-    spacing = min(0.5 / max(system.max_delay, 1e-300), height / 24)
-    first = min(64 + 2 * int(height / spacing), _MAX_POINTS // 8)
+    first = 32 + int(2.0 * height * system.max_delay)
+    if first > _MAX_POINTS:
+        return RootCount(line, None, height, 0)
     # Denser towards the bottom, where det Δ is far from its asymptote.
-    grid = height * np.linspace(0.0, 1.0, first) ** 1.5
-    if hints is not None and len(hints):
-        near = np.abs(np.asarray(hints))[:, None] + spacing * np.array([-0.1, -0.02, 0.02, 0.1])
-        grid = np.union1d(grid, near[(near > 0) & (near < height)])
-    omega, values = grid, _determinant(system, line, grid)
-    points = omega.size
+    omega = height * np.linspace(0.0, 1.0, first) ** 2
+    phase, slope = _phase_and_slope(system, line, omega)
+    points = first
     while True:
-        if (values == 0).any() or not np.isfinite(values).all():
+        if not np.isfinite(slope).all():
             return RootCount(line, None, height, points)
-        turn = np.angle(values[1:] / values[:-1])
-        coarse = np.flatnonzero(np.abs(turn) > _LARGEST_TURN)
+        width = np.diff(omega)
+        turn = np.remainder(np.diff(phase) + math.pi, 2 * math.pi) - math.pi
+        # arg det Δ(line + iω) changes at the rate Re (det Δ)'/det Δ.
+        expected = 0.5 * width * (slope.real[1:] + slope.real[:-1])
+        size = width * np.maximum(np.abs(slope[1:]), np.abs(slope[:-1]))
+        coarse = np.flatnonzero(
+            (size > _LARGEST_STEP) | (np.abs(turn - expected) > _LARGEST_SURPRISE)
+        )
         if coarse.size == 0:
             break
-        middle = 0.5 * (omega[coarse] + omega[coarse + 1])
-        exhausted = (middle <= omega[coarse]).any() or points > _MAX_POINTS
-        if exhausted or (omega[coarse + 1] - omega[coarse] < 1e-13 * height).any():
+        if points > _MAX_POINTS or width[coarse].min() < 1e-13 * height:
             return RootCount(line, None, height, points)
-        between = _determinant(system, line, middle)
+        middle = 0.5 * (omega[coarse] + omega[coarse + 1])
+        new_phase, new_slope = _phase_and_slope(system, line, middle)
         omega = np.insert(omega, coarse + 1, middle)
-        values = np.insert(values, coarse + 1, between)
+        phase = np.insert(phase, coarse + 1, new_phase)
+        slope = np.insert(slope, coarse + 1, new_slope)
         points += middle.size
-    end = line + 1j * omega[-1]
-    rest = n * (math.pi / 2 - np.angle(end)) - np.angle(values[-1] / (end / abs(end)) ** n)
-    count = n / 2 - (turn.sum() + rest) / math.pi
+    end = math.atan2(omega[-1], line)
+    rest = n * (math.pi / 2 - end)
+    beyond = np.remainder(phase[-1] - n * end + math.pi, 2 * math.pi) - math.pi
+    count = n / 2 - (turn.sum() + rest - beyond) / math.pi
     whole = round(float(count))
     return RootCount(line, whole if abs(count - whole) < 1e-3 else None, height, points)
+
+
+def _phase_and_slope(
+    system: DelaySystem, line: float, omega: FloatArray
+) -> tuple[FloatArray, ComplexArray]:
+    """Return arg det Δ and (det Δ)'/det Δ at line + iω; NaN where Δ is singular."""
+    s = line + 1j * omega
+    sign, size = np.linalg.slogdet(characteristic.matrix(system, s))
+    slope = characteristic.log_derivative(system, s)
+    return np.angle(sign), np.where(np.isfinite(size), slope, np.nan)

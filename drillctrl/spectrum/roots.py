@@ -18,9 +18,14 @@ from drillctrl.delay_system import DelaySystem
 from drillctrl.errors import InputError, checked_number
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
-from drillctrl.spectrum.pseudospectral import MAX_DEGREE, approximate_roots, degree_for
+from drillctrl.spectrum.pseudospectral import (
+    MAX_DEGREE,
+    degree_for_reach,
+    generator_eigenvalues,
+)
 
 BoolArray = npt.NDArray[np.bool_]
+_Polished = tuple[ComplexArray, BoolArray]
 EPSILON = float(np.finfo(float).eps)
 # Roots that a relative change of the coefficients this small makes coincide are reported
 # as one multiple root: gains are rarely known to more digits.
@@ -75,7 +80,7 @@ class Root:
         return float(reach)
 
 
-def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, BoolArray]:
+def polish(system: DelaySystem, start: ComplexArray) -> _Polished:
     """Drive approximate roots to the characteristic equation, all at once.
 
     Parameters
@@ -92,75 +97,102 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, Bool
     converged : bool array, (q,)
         Whether the last correction was at the level of rounding.
     """
+    if start.size == 1:
+        value, converged = _polish_one(system, complex(start[0]))
+        return np.array([value]), np.array([converged])
     s = np.where(start.imag > 0, start, start.real + 0j)
-    scale = 1.0 + np.abs(s)
-    last = np.full(s.shape, np.inf)
-    active = np.ones(s.shape, dtype=bool)
     done = np.zeros(s.shape, dtype=bool)
-    for _ in range(20):
-        newton = 1.0 / characteristic.log_derivative(system, s[active])
-        everyone = np.concatenate([s, s[s.imag > 0].conj()])
-        gap = s[active, None] - everyone[None, :]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            pull = np.where(gap == 0, 0, 1.0 / gap).sum(axis=1)
-            step = newton / (1.0 - newton * pull)
-        step = np.where(np.isfinite(step), step, newton)
-        step = step * np.minimum(1.0, 0.3 * scale[active] / np.maximum(np.abs(step), 1e-300))
-        real = s[active].imag == 0
-        step = np.where(real, step.real, step)
-        size = np.abs(step)
+    last = np.full(s.shape, np.inf)
+    for _ in range(24):
+        newton = 1.0 / characteristic.log_derivative(system, s)
+        everyone = np.concatenate([s, s[s.imag > 0].conj()]) if s.imag.any() else s
+        gap = s[:, None] - everyone
+        gap[gap == 0] = np.inf
+        step = newton / (1.0 - newton * (1.0 / gap).sum(axis=1))
+        step.imag[s.imag == 0] = 0.0
+        step[done] = 0.0
+        size, scale = np.abs(step), 1.0 + np.abs(s)
         # Once corrections no longer shrink, what remains is noise of the evaluation.
-        stalled = (size >= last[active]) & (size < 1e-3 * scale[active])
-        moved = s.copy()
-        moved[active] = np.where(stalled, s[active], s[active] - step)
-        moved = np.where(moved.imag < 0, moved.conj(), moved)
-        s = moved
-        finished = (size <= 4 * EPSILON * scale[active]) | stalled
-        last[active] = size
-        index = np.flatnonzero(active)
-        done[index[finished]] = True
-        active[index[finished]] = False
-        if not active.any():
+        stalled = (size >= last) & (size < 1e-3 * scale)
+        step[stalled] = 0.0
+        if (size > 0.3 * scale).any():
+            step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
+        s = s - step
+        s.imag = np.abs(s.imag)
+        last = size
+        # The iteration squares the error relative to the distance of the next root.
+        square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
+        done |= stalled | square | (size <= 4 * EPSILON * scale)
+        if done.all():
             break
     return s, done
 
 
-def _gather(system: DelaySystem, line: float, values: ComplexArray, degree: int) -> _Polished:
-    """Return polished roots right of a line, raising the degree until all converge.
+def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
+    """Do for a single root what `polish` does for many, at half the cost."""
+    last = math.inf
+    for _ in range(24):
+        newton = 1.0 / characteristic.log_derivative_at(system, s)
+        step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
+        size, scale = abs(step), 1.0 + abs(s)
+        if size >= last and size < 1e-3 * scale:
+            return s, True
+        s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
+        s = complex(s.real, abs(s.imag))
+        last = size
+        if size**2 <= EPSILON * scale * min(2.0 * s.imag or scale, scale):
+            return s, True
+    return s, False
+
+
+def _gather(
+    system: DelaySystem, depth: float, line: float | None = None
+) -> tuple[ComplexArray, BoolArray]:
+    """Return polished roots, raising the degree of the collocation until all converge.
 
     Parameters
     ----------
     system : DelaySystem
         Any.
-    line : float
-        Roots right of it are wanted; a few that turn out left of it may come along.
-    values : array
-        Eigenvalues of the collocation of degree ``degree``.
-    degree : int
-        At least the degree that resolves the line, or 0 to have it chosen.
+    depth : float
+        How far left of the rightmost root roots are wanted.
+    line : float, optional
+        Roots right of it are wanted, whatever the depth.
     """
-    needed = degree_for(system, line)
-    reach = characteristic.magnitude_bound(system, line - 0.02)
-    # The rule has a reserve; a line only slightly further left does not use it up.
-    if degree < needed - 2:
-        degree = needed
-        values = approximate_roots(system, degree)
+    # Drawn a little to the left, so that it need not be drawn again for most systems.
+    sure = -0.5 / system.max_delay if system.delays else 0.0
+    sure = sure if line is None else line
+    reach = characteristic.magnitude_bound(system, sure)
+    degree = degree_for_reach(reach * system.max_delay)
     while True:
-        # Starting values of a k-fold root are off by the k-th root of the error.
+        values = generator_eigenvalues(system, degree)
         size = np.abs(values)
-        wanted = (values.imag >= 0) & (values.real >= line - 0.02 * (1.0 + size))
         # No root lies beyond the bound: what the collocation has there is its own.
-        start = values[wanted & (size <= 1.1 * reach)]
+        inside = values[(values.imag >= 0) & (size <= 1.1 * reach)]
+        floor = line
+        if floor is None:
+            if inside.size == 0 or inside.real.max() - depth < sure:
+                top = float(inside.real.max()) if inside.size else sure - depth
+                sure = min(top, sure) - depth - 0.01 * (1.0 + abs(top))
+                reach = characteristic.magnitude_bound(system, sure)
+                degree = max(degree, degree_for_reach(reach * system.max_delay))
+                if inside.size == 0 or degree < MAX_DEGREE:
+                    values = generator_eigenvalues(system, degree)
+                    inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
+            floor = float(inside.real.max()) - depth
+        # Starting values of a k-fold root are off by the k-th root of the error.
+        slack = 0.02
+        if depth == 0.0 and line is None:
+            top = inside[int(np.argmax(inside.real))]
+            near = int((np.abs(inside - top) < _CLOSE * (1.0 + abs(top))).sum())
+            slack = 1e-3 if near == 1 and not 0.0 < top.imag < _CLOSE else slack
+        start = inside[inside.real >= floor - slack * (1.0 + np.abs(inside))]
         s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
         if (done & ~strayed).all() or degree > MAX_DEGREE // 2:
             order = np.argsort(-s.real, kind="stable")
             return s[order], done[order]
         degree *= 2
-        values = approximate_roots(system, degree)
-
-
-_Polished = tuple[ComplexArray, BoolArray]
 
 
 def spectral_abscissa(system: DelaySystem) -> float:
@@ -171,12 +203,22 @@ def spectral_abscissa(system: DelaySystem) -> float:
     Where roots coincide to rounding the value is the real part of their centre; see
     `dominant_roots` for the spread.
     """
-    degree = degree_for(system)
-    values = approximate_roots(system, degree)
-    s, done = _gather(system, float(values[0].real), values, degree)
-    if s.size == 1 and (s[0].imag == 0 or s[0].imag > _CLOSE):
-        return float(s[0].real)
+    s, done = _gather(system, 0.0)
+    top = complex(s[0])
+    isolated = s.size == 1 or (np.abs(top - s[1:]) > _CLOSE * (1.0 + abs(top))).all()
+    if isolated and (top.imag == 0 or top.imag > _CLOSE):
+        return top.real
     return max(root.rightmost for root in _resolve(system, s, done))
+
+
+def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
+    """Return the rightmost characteristic roots with imag ≥ 0, rightmost first.
+
+    Those within 1/τ of the spectral abscissa are given, with τ the largest delay, and all
+    of them where there is no delay.
+    """
+    depth = 1.0 / system.max_delay if system.delays else 1e300
+    return _resolve(system, *_gather(system, depth))
 
 
 def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ...]:
@@ -204,21 +246,8 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
     reach = characteristic.magnitude_bound(system, line) * system.max_delay
     if 0.55 * reach + 5 > MAX_DEGREE:
         raise InputError("right_of", line, "further right: too many roots to resolve")
-    s, done = _gather(system, line, np.zeros(0, dtype=complex), 0)
+    s, done = _gather(system, 0.0, line)
     return tuple(root for root in _resolve(system, s, done) if root.rightmost >= line)
-
-
-def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
-    """Return the rightmost characteristic roots with imag ≥ 0, rightmost first.
-
-    Those within 1/τ of the spectral abscissa are given, with τ the largest delay, and all
-    of them where there is no delay.
-    """
-    degree = degree_for(system)
-    values = approximate_roots(system, degree)
-    depth = 1.0 / system.max_delay if system.delays else math.inf
-    line = max(float(values[0].real) - depth, -1e300)
-    return _resolve(system, *_gather(system, line, values, degree))
 
 
 def _resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root, ...]:
@@ -288,8 +317,9 @@ def _cluster(
         outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
         if outside < 4.0 * spread:
             continue
-        floor = 1e-3 * (1.0 + abs(centre))
-        radius = min(max(2.0 * spread, floor), 0.5 * outside)
+        # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
+        wide = min(0.2 * (1.0 + abs(centre)), 0.3 / system.max_delay if system.delays else 1.0)
+        radius = min(max(2.0 * spread, wide), 0.5 * outside)
         root = _multiple_root(system, members, centre, radius)
         if root is not None:
             return sorted({i for i, _ in mirrored[:size]}), root

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
+import scipy.sparse.linalg
 
 from drillctrl.delay_system import DelaySystem, low_rank_factors
 from drillctrl.errors import InputError, checked_integer
@@ -65,6 +67,44 @@ class SemiDiscretization:
             d[rows, rows - rank] = 1.0
         return d
 
+    def sparse_matrix(self) -> scipy.sparse.csc_array:
+        """Return D as a sparse array; its nonzeros and the cost of using it grow as m."""
+        n, rank = self.P.shape[0], self.signals.shape[0]
+        memory = max((k for k, _ in self.terms), default=0)
+        size = n + memory * rank
+        top = scipy.sparse.lil_array((size, size))
+        present = self.P.copy()
+        for k, factor in self.terms:
+            if k == 0:
+                present += factor @ self.signals
+            else:
+                start = n + (k - 1) * rank
+                top[:n, start : start + rank] = factor
+        top[:n, :n] = present
+        if memory:
+            top[n : n + rank, :n] = self.signals
+        rows = np.arange(n + rank, size)
+        shift = scipy.sparse.coo_array((np.ones(rows.size), (rows, rows - rank)), (size, size))
+        return (top.tocsc() + shift.tocsc()).tocsc()
+
+    def multipliers_near(self, target: complex, count: int = 2) -> ComplexArray:
+        """Return the eigenvalues of D nearest to a target, at a cost linear in m.
+
+        Parameters
+        ----------
+        target : complex
+            For a characteristic root s this is exp(s Δt). D − target must be regular.
+        count : int
+            How many.
+        """
+        # Complex throughout: a real matrix with a complex shift would be split in two.
+        matrix = self.sparse_matrix().astype(complex)
+        start = np.cos(np.arange(matrix.shape[0]))
+        values = scipy.sparse.linalg.eigs(
+            matrix, k=count, sigma=target, v0=start, return_eigenvectors=False
+        )
+        return np.asarray(values[np.argsort(np.abs(values - target), kind="stable")])
+
     def multipliers(self) -> ComplexArray:
         """Return the eigenvalues of D, largest modulus first."""
         values = np.linalg.eigvals(self.matrix()).astype(complex)
@@ -82,14 +122,15 @@ class SemiDiscretization:
         return math.log(radius) / self.step if radius > 0.0 else -math.inf
 
 
-def default_intervals(system: DelaySystem) -> int:
+def default_intervals(system: DelaySystem, order: int) -> int:
     """Choose m so that each root right of the imaginary axis sees a fine step.
 
     Δt shrinks with the delay and with the largest possible |s|; a fixed m would show
     stable islands at small ω0 that do not exist.
     """
     reach = magnitude_bound(system, 0.0) * system.max_delay
-    return min(_DEFAULT_LIMIT, max(40, math.ceil(4.0 * reach)))
+    least, dense = (16, 2.0) if order == 2 else (40, 4.0)
+    return min(_DEFAULT_LIMIT, max(least, math.ceil(dense * reach)))
 
 
 def semidiscretize(system: DelaySystem, m: int | None = None, order: int = 1) -> SemiDiscretization:
@@ -118,8 +159,9 @@ def semidiscretize(system: DelaySystem, m: int | None = None, order: int = 1) ->
     """
     if not system.delays:
         raise InputError("system", "a system without delay", "one with a delay")
-    m = default_intervals(system) if m is None else checked_integer("m", m, 1, MAX_INTERVALS)
     order = checked_integer("order", order, 0, 2)
+    m = default_intervals(system, order) if m is None else m
+    m = checked_integer("m", m, 1, MAX_INTERVALS)
     step = system.max_delay / (m + 0.5)
     _, signals = low_rank_factors(np.vstack([right for _, right in system.factors]))
     gather = np.linalg.pinv(signals)

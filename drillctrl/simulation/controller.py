@@ -1,0 +1,134 @@
+"""The controller as it runs on a rig: gains, clock, delays, actuator, limits, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.feedback import FeedbackStructure, gain_matrices, preset_structure
+from drillctrl.plant import INPUT_NAMES, STATE_NAMES
+
+FloatArray = npt.NDArray[np.float64]
+DELAYS = ("fixed", "current")
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """Output feedback u = K1 Y(t) + K2 Y(t − τ) with what surrounds it (Eqs. 36-40).
+
+    The outputs are perturbations from steady drilling at the starting point; where the top
+    end is told to move otherwise, its motion is taken off.
+
+    Attributes
+    ----------
+    feedback : FeedbackStructure or str
+        Which states are fed back to which inputs; a name as in `preset_structure`.
+    K1, K2 : array_like, (m, p) or flat
+        Gains on Y(t) and on Y(t − τ).
+    activation : float
+        Time at which the controller is switched on; before it u = 0.
+    delay : {"fixed", "current"}
+        Whether the delayed outputs are those of τ0 ago or of the present delay τ(t) ago.
+    period : float, optional
+        Sampling period; the command is held in between. Without it the law is continuous.
+    measurement_delay : float
+        Age of every measurement, when it is used.
+    actuator_lag : float
+        Time constant of a first-order lag between command and torque; 0 for none.
+    limit : float
+        Largest absolute command.
+    rate_limit : float
+        Fastest change of the input: of the actuator if it has a lag, else from sample to
+        sample; a continuous command without lag cannot be limited so.
+    noise : mapping
+        Standard deviation by state name of the white noise added to each sample.
+    seed : int
+        Of the noise.
+    schedule : tuple of (float, array_like, array_like)
+        Later gains: from which time, K1, K2; times must rise.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range or a shape does not fit.
+    """
+
+    feedback: FeedbackStructure | str
+    K1: npt.ArrayLike
+    K2: npt.ArrayLike | None = None
+    activation: float = 0.0
+    delay: str = "fixed"
+    period: float | None = None
+    measurement_delay: float = 0.0
+    actuator_lag: float = 0.0
+    limit: float | None = None
+    rate_limit: float | None = None
+    noise: Mapping[str, float] = field(default_factory=dict)
+    seed: int = 0
+    schedule: tuple[tuple[float, npt.ArrayLike, npt.ArrayLike | None], ...] = ()
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: object) -> None:
+            object.__setattr__(self, name, value)
+
+        if isinstance(self.feedback, str):
+            put("feedback", preset_structure(self.feedback))
+        for name in ("activation", "measurement_delay", "actuator_lag"):
+            put(name, checked_number(name, getattr(self, name), 0.0, 1e9))
+        for name in ("limit", "rate_limit", "period"):
+            if getattr(self, name) is not None:
+                value = checked_number(name, getattr(self, name), 0.0, 1e9, open_low=True)
+                put(name, value)
+        put("seed", checked_integer("seed", self.seed, 0, 2**32 - 1))
+        if self.delay not in DELAYS:
+            raise InputError("delay", self.delay, f"one of {', '.join(DELAYS)}")
+        if self.delay == "current" and self.measurement_delay and self.period is None:
+            raise InputError(
+                "measurement_delay",
+                self.measurement_delay,
+                "0 with delay = current, unless sampled",
+            )
+        if self.rate_limit is not None and self.period is None and not self.actuator_lag:
+            raise InputError(
+                "rate_limit", self.rate_limit, "left out unless there is a period or actuator lag"
+            )
+        if self.noise and self.period is None:
+            raise InputError("noise", dict(self.noise), "left out unless there is a period")
+        for name, deviation in self.noise.items():
+            if name not in STATE_NAMES:
+                raise InputError("noise", name, f"of one of {', '.join(STATE_NAMES)}")
+            checked_number(f"noise {name}", deviation, 0.0, 1e9)
+        self.gains()
+
+    def gains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return when each set of gains starts, and the gains on all states.
+
+        Returns
+        -------
+        times : array, (g,)
+        K1, K2 : array, (g, 2, 4)
+            From the plant's states to its inputs.
+        """
+        assert isinstance(self.feedback, FeedbackStructure)
+        rows = [_place("inputs", name, INPUT_NAMES) for name in self.feedback.inputs]
+        columns = [_place("outputs", name, STATE_NAMES) for name in self.feedback.outputs]
+        entries = [(0.0, self.K1, self.K2), *self.schedule]
+        times = np.zeros(len(entries))
+        full = np.zeros((2, len(entries), len(INPUT_NAMES), len(STATE_NAMES)))
+        for k, (start, now, past) in enumerate(entries):
+            times[k] = checked_number("schedule", start, 0.0, 1e9)
+            if k and not times[k] > times[k - 1]:
+                raise InputError("schedule", times[: k + 1].tolist(), "at rising times above 0")
+            for which, matrix in enumerate(gain_matrices(self.feedback, now, past)):
+                full[which, k][np.ix_(rows, columns)] = matrix
+        return times, full[0], full[1]
+
+
+def _place(what: str, name: str, names: tuple[str, ...]) -> int:
+    if name not in names:
+        raise InputError(what, name, f"among {', '.join(names)}")
+    return names.index(name)

@@ -1,0 +1,67 @@
+"""Write the motion of a simulation to a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from drillctrl.errors import InputError
+from drillctrl.files import replacing
+from drillctrl.simulation.result import Simulation
+
+ENDINGS = (".csv", ".npz", ".parquet")
+
+
+def check_export_path(path: str | Path) -> None:
+    """Raise `InputError` if a motion cannot be written under this name."""
+    ending = Path(path).suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError("out", str(path), f"a file that ends in {', '.join(ENDINGS)}")
+    if ending == ".parquet":
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError:
+            raise InputError(
+                "out", str(path), "a .csv or .npz file, or pyarrow installed"
+            ) from None
+
+
+def export_motion(simulation: Simulation, path: str | Path) -> None:
+    """Write the motion at the integrator's own steps, whole or not at all.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        A run.
+    path : str or Path
+        ``.csv`` (a comment line, then a header), ``.npz`` (one array a column) or
+        ``.parquet`` (needs pyarrow).
+
+    Raises
+    ------
+    InputError
+        If the ending is none of these.
+    OSError
+        If the file cannot be written.
+    """
+    check_export_path(path)
+    columns = simulation.motion.columns()
+    ending = Path(path).suffix.lower()
+    with replacing(path) as file:
+        if ending == ".npz":
+            np.savez_compressed(file, allow_pickle=False, **columns)
+        elif ending == ".parquet":
+            import pyarrow
+            import pyarrow.parquet
+
+            pyarrow.parquet.write_table(pyarrow.table(columns), file)
+        else:
+            text = io.StringIO()
+            text.write(f"# drillctrl simulation, dimensionless; {simulation.point!r}\n")
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+            file.write(text.getvalue().encode("utf-8"))

@@ -1,0 +1,127 @@
+"""What the compiled integrator works on: settings, and the steps it has taken.
+
+Numba takes named tuples of arrays; arrays are shared, so what one function writes the others
+see. Times, lengths and torques are dimensionless throughout.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+# Torsion of the bit: Φ' > 0, held at Φ' = 0, Φ' < 0.
+FORWARD, STUCK, REVERSE = 0, 1, 2
+# Axial motion while in contact: Z' > 0, held at Z' = 0 by the wear flat, Z' < 0.
+DOWN, HELD, UP = 0, 1, 2
+
+# Events. The first seven are zeros of functions that are positive in the present mode.
+TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2
+AXIAL_RATE, HELD_TO_UP, HELD_TO_DOWN, DEPTH = 3, 4, 5, 6
+KINDS = 7
+BARRIER, BEGIN = 7, 8
+
+# How the march stopped.
+DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE = 0, 1, 2, 3, 4, 5
+
+# A break of level L is a jump of the L-th derivative of x or θ. The pair of order 5 keeps its
+# order across breaks of a higher level than this in what is delayed.
+LAST_LEVEL = 4
+NO_BREAK = 99
+MAX_FACE_LEVELS = 400
+
+# Entries of `flags`.
+LINEAR, MULTIPLE, FEEDBACK, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK = 0, 1, 2, 3, 4, 5, 6
+# Entries of `control`.
+T_ON, MEASURE_DELAY, FEEDBACK_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3, 4
+# Columns of `drive`: start; top-end offset, speed, acceleration for x and θ; strength and slope.
+DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
+# Entries of `probe`, beside an event function's ingredients.
+P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_U0, P_U1 = range(9)
+PROBES = 9
+
+
+# Columns of `History`.
+START, LENGTH, X, THETA, ACTUATORS, HELD_U, REALS = 0, 1, 2, 8, 14, 22, 24
+CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, WHOLES = range(8)
+
+
+class Settings(NamedTuple):
+    """What does not change during a run; tuples where arrays would cost a reference count.
+
+    Attributes
+    ----------
+    p : tuple, (9,)
+        Groups in the order of `PARAMETER_NAMES`.
+    flags : tuple of int
+        LINEAR, MULTIPLE, FEEDBACK, ...
+    control : tuple
+        T_ON, MEASURE_DELAY, ...
+    limit, rate : tuple, (2,)
+        Of each input, infinite where there is none.
+    gains : array, (g, 17)
+        From when each set of gains holds; K1, then K2, by rows, on all states.
+    drive : array, (m, 9)
+        Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
+    linear : array, (5, 10)
+        A1, A2, B of the linear model side by side; below them the rows of the linear depth
+        of cut, and its steady value.
+    lags : tuple, (3,)
+        Constant delays: of the linear model, of the measured and of the fed back signal; 0
+        where there is none.
+    noise : array, (k, 4)
+        Added to the k-th sample of the states.
+    tolerance : tuple, (2,)
+        rtol, atol.
+    scale : tuple, (7,)
+        Size of each event function, to tell zero from rounding.
+    """
+
+    p: Any
+    flags: Any
+    control: Any
+    limit: Any
+    rate: Any
+    gains: Any
+    drive: Any
+    linear: Any
+    lags: Any
+    noise: Any
+    tolerance: Any
+    scale: Any
+
+
+class History(NamedTuple):
+    """The steps taken so far; step 0 is the motion before t = 0.
+
+    Attributes
+    ----------
+    real : array, (cap, 24)
+        START: time at which a step starts; LENGTH; X, THETA: coefficients of quintics in
+        s = (t − start)/length; ACTUATORS: those of a cubic for each actuator; HELD_U: output
+        of a sampled controller.
+    whole : int array, (cap, 7)
+        CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
+        t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade
+        pitches it lies back.
+    """
+
+    real: Any
+    whole: Any
+
+
+class Mode(NamedTuple):
+    """One smooth branch of the model, and where its delayed signals are found."""
+
+    contact: int
+    torsion: int
+    axial: int
+    lag: int
+    face: int
+    passes: int
+    lag0: int
+    lag1: int
+    lag2: int
+    piece: int
+    gains: int
+    on: int
+    held0: float
+    held1: float

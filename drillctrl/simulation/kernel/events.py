@@ -1,0 +1,166 @@
+"""Events: functions that are positive in a mode, and the search for their first zero."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .data import (
+    ACTUATORS,
+    AXIAL_RATE,
+    DEPTH,
+    DOWN,
+    FORWARD,
+    HELD,
+    HELD_TO_DOWN,
+    HELD_TO_UP,
+    LENGTH,
+    P_DEPTH,
+    P_DOWN,
+    P_FORWARD,
+    P_REVERSE,
+    P_UP,
+    PROBES,
+    RELEASE_FORWARD,
+    RELEASE_REVERSE,
+    START,
+    STUCK,
+    TORSION_RATE,
+)
+from .interpolate import cubic, state_at
+from .model import rate_of_change
+from .physics import rates
+
+SAMPLES = 10
+NONE = 2.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def watched(kind, mode):
+    """Whether an event can end the present mode."""
+    if kind == TORSION_RATE:
+        return mode.torsion != STUCK
+    if kind in (RELEASE_FORWARD, RELEASE_REVERSE):
+        return mode.torsion == STUCK
+    if kind == AXIAL_RATE:
+        return mode.contact == 1 and mode.axial != HELD
+    if kind in (HELD_TO_UP, HELD_TO_DOWN):
+        return mode.contact == 1 and mode.axial == HELD
+    return True
+
+
+@numba.njit(cache=True, error_model="numpy")
+def value_of(kind, mode, probe, dx, dtheta, p):
+    """Event function: positive in the present mode, zero at its end."""
+    if kind == RELEASE_FORWARD:
+        return -probe[P_FORWARD]
+    if kind == RELEASE_REVERSE:
+        return probe[P_REVERSE]
+    if kind == HELD_TO_UP:
+        return probe[P_UP]
+    if kind == HELD_TO_DOWN:
+        return -probe[P_DOWN]
+    if kind == DEPTH:
+        return probe[P_DEPTH] if mode.contact == 1 else -probe[P_DEPTH]
+    axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), p)
+    if kind == TORSION_RATE:
+        return rotary_rate if mode.torsion == FORWARD else -rotary_rate
+    return axial_rate if mode.axial == DOWN else -axial_rate
+
+
+@numba.njit(cache=True, error_model="numpy")
+def value_on_step(settings, history, steps, mode, kind, s):
+    """Event function on the step that is written at place ``steps``, at s."""
+    state = state_at(history, steps, s)
+    probe = np.zeros(PROBES)
+    if kind != TORSION_RATE and kind != AXIAL_RATE:
+        y = np.empty(6)
+        for i in range(4):
+            y[i] = state[i]
+        for i in range(2):
+            y[4 + i] = cubic(history.real, ACTUATORS + 4 * i, steps, s)
+        t = history.real[steps, START] + s * history.real[steps, LENGTH]
+        rate_of_change(settings, history, steps, mode, t, y, np.empty(6), probe)
+    return value_of(kind, mode, probe, state[1], state[3], settings.p)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def cannot_vanish(kind, mode, stages, p, tolerance):
+    """Whether the stages of a step show an event function far from zero throughout."""
+    low, high = np.inf, -np.inf
+    for i in range(stages.shape[0]):
+        value = value_of(kind, mode, stages[i], stages[i, PROBES], stages[i, PROBES + 1], p)
+        low, high = min(low, value), max(high, value)
+    return low > tolerance and low > 0.5 * (high - low)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def root_between(settings, history, steps, mode, kind, a, fa, b, fb):
+    """Zero between a (positive) and b (negative) by the Illinois method."""
+    side = 0
+    for _ in range(80):
+        c = (a * fb - b * fa) / (fb - fa)
+        fc = value_on_step(settings, history, steps, mode, kind, c)
+        if fc > 0.0:
+            a, fa = c, fc
+            if side == 1:
+                fb *= 0.5
+            side = 1
+        else:
+            b, fb = c, fc
+            if side == -1:
+                fa *= 0.5
+            side = -1
+        if abs(b - a) < 1e-12 or fc == 0.0:
+            break
+    return b
+
+
+@numba.njit(cache=True, error_model="numpy")
+def first_zero(settings, history, steps, mode, kind, stages):
+    """First s at which an event function turns negative on the step just tried.
+
+    The function is sampled and its interior minima are looked into, so that a pair of zeros
+    within one step is found. It may start from zero, where the mode has just been entered.
+
+    Returns
+    -------
+    float
+        s in [0, 1]; 0 if the function is negative from the start, 2 if it never is.
+    """
+    tolerance = 1e-12 * settings.scale[kind]
+    if cannot_vanish(kind, mode, stages, settings.p, tolerance):
+        return NONE
+    values = np.empty(SAMPLES + 1)
+    for i in range(SAMPLES + 1):
+        values[i] = value_on_step(settings, history, steps, mode, kind, i / SAMPLES)
+    for i in range(1, SAMPLES + 1):
+        s, value = i / SAMPLES, values[i]
+        left, left_value = (i - 1) / SAMPLES, values[i - 1]
+        if i < SAMPLES and 0.0 < value <= left_value and value <= values[i + 1]:
+            bend = values[i + 1] - 2.0 * value + left_value
+            if bend > 0.0:
+                shift = 0.5 * (left_value - values[i + 1]) / bend
+                dip = s + shift / SAMPLES
+                dip_value = value_on_step(settings, history, steps, mode, kind, dip)
+                if dip_value < value:
+                    s, value = dip, dip_value
+        if value >= -tolerance:
+            continue
+        if left_value > 0.0:
+            return root_between(settings, history, steps, mode, kind, left, left_value, s, value)
+        if i > 1:
+            return left
+        # It starts from zero: is it positive anywhere before?
+        for _ in range(30):
+            middle = 0.5 * s
+            middle_value = value_on_step(settings, history, steps, mode, kind, middle)
+            if middle_value > 0.0:
+                return root_between(
+                    settings, history, steps, mode, kind, middle, middle_value, s, value
+                )
+            s, value = middle, middle_value
+            if value >= -tolerance:
+                return 0.0 if s < 1e-6 else s
+        return 0.0
+    return NONE

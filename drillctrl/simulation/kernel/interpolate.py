@@ -1,0 +1,203 @@
+"""Dense output of the steps, and the search for the step that holds a delayed instant."""
+
+from __future__ import annotations
+
+import numba
+
+from .data import LAST_LEVEL, LENGTH, LEVEL, START, STUCK, THETA, TORSION, X
+from .physics import rates, turned
+
+SOLVE_STEPS = 60
+
+
+@numba.njit(cache=True, error_model="numpy")
+def quintic(c, n, j, s):
+    """Value at s of the quintic whose coefficients start in column n of row j."""
+    return c[j, n] + s * (
+        c[j, n + 1] + s * (c[j, n + 2] + s * (c[j, n + 3] + s * (c[j, n + 4] + s * c[j, n + 5])))
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def quintic_slope(c, n, j, s):
+    """Derivative in s of the quintic in row j."""
+    return c[j, n + 1] + s * (
+        2.0 * c[j, n + 2]
+        + s * (3.0 * c[j, n + 3] + s * (4.0 * c[j, n + 4] + s * 5.0 * c[j, n + 5]))
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def cubic(c, n, j, s):
+    """Value at s of the cubic whose coefficients start in column n of row j."""
+    return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * c[j, n + 3]))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def state_at(history, j, s):
+    """State (x, x', θ, θ') on step j at s."""
+    c = history.real
+    h = c[j, LENGTH]
+    return (
+        quintic(c, X, j, s),
+        quintic_slope(c, X, j, s) / h,
+        quintic(c, THETA, j, s),
+        quintic_slope(c, THETA, j, s) / h,
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fit_quintic(c, n, j, h, value, rate, rate_end, increment, curve, curve_end):
+    """Quintic through value, rate and acceleration at both ends (Hermite).
+
+    The increment is taken instead of the end value: it does not cancel for short steps.
+    """
+    first, second = h * rate, 0.5 * h * h * curve
+    d = increment - first - second
+    e = h * rate_end - first - 2.0 * second
+    f = h * h * curve_end - 2.0 * second
+    c[j, n], c[j, n + 1], c[j, n + 2] = value, first, second
+    c[j, n + 3] = 10.0 * d - 4.0 * e + 0.5 * f
+    c[j, n + 4] = -15.0 * d + 7.0 * e - f
+    c[j, n + 5] = 6.0 * d - 3.0 * e + 0.5 * f
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fit_cubic(c, n, j, h, value, rate, rate_end, increment):
+    """Cubic through value and rate at both ends (Hermite)."""
+    d, e = increment - h * rate, h * (rate_end - rate)
+    c[j, n], c[j, n + 1] = value, h * rate
+    c[j, n + 2] = 3.0 * d - e
+    c[j, n + 3] = e - 2.0 * d
+
+
+@numba.njit(cache=True, error_model="numpy")
+def pitch_of(p):
+    """2π/n, from the plant's own condition on the delay."""
+    zero = (0.0, 0.0, 0.0, 0.0)
+    return -turned(zero, zero, 0.0, p)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def beyond(history, p, j, s, t, theta, extra):
+    """Angle from the bit's angle less the lag back to step j at s; positive if s is too early.
+
+    ``extra`` is the lag in angle beyond 2π/n.
+    """
+    delay = t - history.real[j, START] - s * history.real[j, LENGTH]
+    then = (0.0, 0.0, quintic(history.real, THETA, j, s), 0.0)
+    return turned((0.0, 0.0, theta, 0.0), then, delay, p) - extra
+
+
+@numba.njit(cache=True, error_model="numpy")
+def angle_slope(history, p, j, s):
+    """Angle turned per unit of s on step j."""
+    h = history.real[j, LENGTH]
+    rate = quintic_slope(history.real, THETA, j, s) / h
+    return h * rates((0.0, 0.0, 0.0, rate), p)[1]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def locate_angle(history, p, steps, j, t, theta, extra):
+    """Find the step and s at which the bit was a blade pitch (and ``extra``) back.
+
+    The search starts at step j and stays within the smooth piece of the history that j
+    belongs to; beyond its end the last step is extrapolated, for trial steps only.
+
+    Returns
+    -------
+    j, s
+        Step and place on it; j = -1 if the instant lies beyond the last step.
+    """
+    while (
+        j > 0
+        and history.whole[j, LEVEL] > LAST_LEVEL
+        and (beyond(history, p, j, 0.0, t, theta, extra) < 0.0)
+    ):
+        j -= 1
+    after = beyond(history, p, j, 1.0, t, theta, extra)
+    while (
+        after > 0.0
+        and j + 1 < steps
+        and history.whole[j + 1, LEVEL] > LAST_LEVEL
+        and history.whole[j + 1, TORSION] != STUCK
+    ):
+        j += 1
+        after = beyond(history, p, j, 1.0, t, theta, extra)
+    if after > 0.0 or j == 0:
+        slope = angle_slope(history, p, j, 1.0)
+        if j == 0:  # steady motion: linear, without end on either side
+            return j, 1.0 + after / slope
+        if j + 1 >= steps and after > 1e-9:
+            return -1, 1.0
+        if after > 0.2 * slope:
+            return j, 1.0
+        s = 1.0 + after / slope
+        slope = angle_slope(history, p, j, s)
+        if slope > 0.0:
+            s += beyond(history, p, j, s, t, theta, extra) / slope
+        return j, min(max(s, 1.0), 1.3)
+    before = beyond(history, p, j, 0.0, t, theta, extra)
+    if before <= 0.0:
+        return j, 0.0
+    # Newton inside a bracket; the slope is zero where the bit came to rest.
+    low, high = 0.0, 1.0
+    s = before / (before - after)
+    for _ in range(SOLVE_STEPS):
+        value = beyond(history, p, j, s, t, theta, extra)
+        if value > 0.0:
+            low = s
+        else:
+            high = s
+        slope = angle_slope(history, p, j, s)
+        new = s + value / slope if slope > 0.0 else -1.0
+        if new < low or new > high:
+            new = 0.5 * (low + high)
+        change = abs(new - s)
+        s = new
+        # Newton squares the error; near rest it is the relative one that counts.
+        if change <= 1e-7 * s or change < 1e-14:
+            break
+    return j, s
+
+
+@numba.njit(cache=True, error_model="numpy")
+def locate_time(history, steps, j, time):
+    """Find the step and s of an instant, searching from j within its smooth piece."""
+    while j > 0 and history.whole[j, LEVEL] > LAST_LEVEL and time < history.real[j, START]:
+        j -= 1
+    while (
+        j + 1 < steps
+        and history.whole[j + 1, LEVEL] > LAST_LEVEL
+        and time > history.real[j, START] + history.real[j, LENGTH]
+    ):
+        j += 1
+    return j, (time - history.real[j, START]) / history.real[j, LENGTH]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def step_at(history, steps, time):
+    """Index of the last step that starts at or before an instant (bisection)."""
+    low, high = 0, steps - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if history.real[middle, START] <= time:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@numba.njit(cache=True, error_model="numpy")
+def step_before_angle(history, p, j, t, theta, extra, tolerance):
+    """Search from step j, across breaks, for the step in which the lagged angle lies next.
+
+    At a break it is the step after it, since the bit goes on forward.
+    """
+    while j > 0 and beyond(history, p, j, 0.0, t, theta, extra) < -tolerance:
+        j -= 1
+    while history.whole[j, TORSION] == STUCK or (
+        j > 0 and beyond(history, p, j, 1.0, t, theta, extra) >= -tolerance
+    ):
+        j += 1
+    return j

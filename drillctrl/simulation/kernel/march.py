@@ -1,0 +1,309 @@
+"""The march: steps, events, breaks, and the controller's clock."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .breaks import (
+    advance,
+    angle_limits,
+    follow,
+    least_angle_left,
+    passed_on,
+    retrace,
+)
+from .control import next_clock, take_sample
+from .data import (
+    ACTUATOR,
+    BARRIER,
+    COLLAPSE,
+    CURRENT_DELAY,
+    DONE,
+    KINDS,
+    LENGTH,
+    LEVEL,
+    LINEAR,
+    MAX_FACE_LEVELS,
+    MORE_ROOM,
+    NO_BREAK,
+    NOT_FINITE,
+    PROBES,
+    RATE_FEEDBACK,
+    REVERSE,
+    REVERSED,
+    START,
+    STUCK,
+    TOO_DEEP,
+    TORSION,
+    Mode,
+)
+from .events import NONE, first_zero, value_on_step, watched
+from .interpolate import locate_time
+from .model import rate_of_change
+from .physics import rates
+from .step import STAGE_COLUMNS, STAGES, attempt, record
+from .switch import next_mode, snap
+
+# Places in `ints` and `reals`, where the march is resumed from.
+(STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
+ REJECTED, EVALUATIONS, LAG0) = range(14)  # fmt: skip
+TIME, STEP, HELD0, HELD1, NEXT_SAMPLE = range(5)
+REFINE = 6
+SHORTEST = 1e-14
+
+
+@numba.njit(cache=True, error_model="numpy")
+def mode_of(ints, reals, chain):
+    """Collect the present mode."""
+    passes = ints[I_PASSES]
+    return Mode(
+        ints[I_CONTACT],
+        ints[I_TORSION],
+        ints[I_AXIAL],
+        chain[0],
+        chain[passes - 1],
+        passes,
+        ints[LAG0],
+        ints[LAG0 + 1],
+        ints[LAG0 + 2],
+        ints[PIECE],
+        ints[GAINS],
+        ints[ON],
+        reals[HELD0],
+        reals[HELD1],
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def enter(ints, branch):
+    """Enter a branch."""
+    ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
+
+
+@numba.njit(cache=True, error_model="numpy")
+def time_limits(settings, history, steps, ints, following, t):
+    """Nearest time at which a constant delay meets a break; and the longest step they allow."""
+    nearest, longest = np.inf, np.inf
+    for i in range(3):
+        lag = settings.lags[i]
+        if lag > 0.0:
+            longest = min(longest, lag)
+            b = advance(history, steps, following, MAX_FACE_LEVELS + i, ints[LAG0 + i])
+            if b < steps:
+                nearest = min(nearest, history.real[b, START] + lag)
+    return nearest, longest
+
+
+@numba.njit(cache=True, error_model="numpy")
+def pass_time_breaks(settings, history, steps, ints, following, t):
+    """Move constant delays along; return the level of the break that they bring."""
+    level = NO_BREAK
+    for i in range(3):
+        lag = settings.lags[i]
+        if lag == 0.0:
+            continue
+        gain = 1 if i > 0 and settings.flags[RATE_FEEDBACK] == 1 else 2
+        b = following[MAX_FACE_LEVELS + i]
+        while b < steps and history.real[b, START] + lag <= t:
+            level = min(level, history.whole[b, LEVEL] + gain)
+            ints[LAG0 + i] = b
+            b = advance(history, steps, following, MAX_FACE_LEVELS + i, b)
+        j, _ = locate_time(history, steps, ints[LAG0 + i], t - lag)
+        ints[LAG0 + i] = j
+    return level
+
+
+@numba.njit(cache=True, error_model="numpy")
+def refine(settings, history, steps, mode, kind, t, s, y, k, new, increment, stages, level):
+    """Repeat the step so that it ends where an event function vanishes; return its length."""
+    h = s * history.real[steps, LENGTH]
+    for _ in range(REFINE):
+        attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
+        record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+        value = value_on_step(settings, history, steps, mode, kind, 1.0)
+        if abs(value) <= 1e-11 * settings.scale[kind]:
+            break
+        before = value_on_step(settings, history, steps, mode, kind, 0.98)
+        slope = (value - before) / (0.02 * h)
+        change = -value / slope
+        if not abs(change) < 0.1 * h:
+            break
+        h += change
+    attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
+    record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+    return h
+
+
+@numba.njit(cache=True, error_model="numpy")
+def march(settings, history, ints, reals, y, chain, following, end, max_step):
+    """Integrate until ``end`` or until the history is full.
+
+    Parameters
+    ----------
+    settings, history : Settings, History
+        See there.
+    ints, reals, chain, following : array
+        Where the march stands; changed in place.
+    y : array, (6,)
+        State now; changed in place.
+    end, max_step : float
+        Time to stop at, and longest step.
+
+    Returns
+    -------
+    int
+        Why it stopped: DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
+    """
+    p = settings.p
+    linear = settings.flags[LINEAR] == 1
+    k, stages = np.zeros((STAGES, 6)), np.zeros((STAGES, STAGE_COLUMNS))
+    new, increment, probe = np.zeros(6), np.zeros(6), np.zeros(PROBES)
+    zero_rates = rates((0.0, 0.0, 0.0, 0.0), p)
+    known = False  # whether the rates at the start of the step are
+    while True:
+        t, steps = reals[TIME], ints[STEPS]
+        if t >= end:
+            return DONE
+        if steps + 1 >= history.real.shape[0]:
+            return MORE_ROOM
+        if ints[I_TORSION] == REVERSE:
+            return REVERSED
+        mode = mode_of(ints, reals, chain)
+        level = ints[I_LEVEL]
+        if not known:
+            rate_of_change(settings, history, steps, mode, t, y, k[0], probe)
+            for i in range(PROBES):
+                stages[0, i] = probe[i]
+            stages[0, PROBES], stages[0, PROBES + 1] = y[1], y[3]
+            known = True
+
+        goal, longest = time_limits(settings, history, steps, ints, following, t)
+        goal = min(goal, end, next_clock(settings, ints, reals, t))
+        near, front = np.inf, np.inf
+        if not linear:
+            near, front = angle_limits(history, p, steps, mode, chain, following, t, y, k[0, 3])
+        h = min(reals[STEP], longest, front, max_step)
+        aim = near <= 1.02 * h
+        if aim:
+            h = near
+        at_goal = t + 1.000001 * h >= goal
+        if at_goal:
+            h = goal - t
+            aim = False
+        if not h > SHORTEST * max(1.0, abs(t)) and not (at_goal or aim):
+            return COLLAPSE
+        h = max(h, 1e-15 * max(1.0, abs(t)))
+
+        error = attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
+        ints[EVALUATIONS] += STAGES
+        if error != error:
+            if h < 1e-10:
+                return NOT_FINITE
+            error = 1e4
+        if error < 0.0 or error > 1.0:
+            factor = 0.5 if error < 0.0 else max(0.2, 0.9 * error**-0.2)
+            reals[STEP] = factor * h
+            ints[REJECTED] += 1
+            if reals[STEP] < SHORTEST * max(1.0, abs(t)):
+                return COLLAPSE
+            continue
+        record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+        wanted = h * min(5.0, 0.9 * max(error, 1e-8) ** -0.2)
+        if not (aim or at_goal) or wanted < reals[STEP]:
+            reals[STEP] = wanted
+
+        # End at the break that the lag in angle has met.
+        reached = -1
+        if not linear and mode.torsion != STUCK:
+            size = 1.0 + abs(new[2]) + zero_rates[1] * abs(t)
+            for _ in range(REFINE):
+                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
+                if abs(left) <= 4e-15 * size:
+                    reached = which
+                    break
+                rate = rates((0.0, 0.0, 0.0, new[3]), p)[1]
+                if which < 0 or rate <= 0.0 or (left > 0.0 and not left < 0.1 * h * rate):
+                    break
+                if t + h + left / rate >= goal + 1e-15:
+                    break
+                change = max(left / rate, -0.9 * h)
+                if abs(change) < 1e-15 * max(1.0, t):
+                    reached = which
+                    break
+                h += change
+                at_goal = False
+                attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
+                record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
+            if reached < 0 and which >= 0 and left < -1e-9 * size:
+                reals[STEP] = 0.5 * h
+                ints[REJECTED] += 1
+                continue
+
+        # End at the first event.
+        kind, where = -1, NONE
+        if not linear:
+            for candidate in range(KINDS):
+                if watched(candidate, mode):
+                    s = first_zero(settings, history, steps, mode, candidate, stages)
+                    if s < where:
+                        kind, where = candidate, s
+        if kind >= 0:
+            if where * h < SHORTEST * max(1.0, abs(t)):
+                # Negative from the start: no step, another mode.
+                ints[STALLS] += 1
+                if ints[STALLS] > 20:
+                    return COLLAPSE
+                snap(kind, y, p)
+                enter(ints, next_mode(settings, history, steps, mode, kind, t, y))
+                ints[I_LEVEL] = min(ints[I_LEVEL], 2)
+                known = False
+                continue
+            if where < 1.0:
+                h = refine(
+                    settings, history, steps, mode, kind, t, where, y, k, new, increment,
+                    stages, level,
+                )  # fmt: skip
+                reached, at_goal = -1, False
+        ints[STALLS] = 0
+
+        # Accept.
+        t = goal if at_goal else t + h
+        for i in range(4):
+            y[i] = new[i]
+        if settings.flags[ACTUATOR] == 1:
+            y[4], y[5] = new[4], new[5]
+        steps += 1
+        ints[STEPS], reals[TIME] = steps, t
+        level = pass_time_breaks(settings, history, steps, ints, following, t)
+        if not linear:
+            follow(settings, history, steps, mode, chain, t, y[2])
+        if reached >= 0:
+            b = following[reached]
+            gain = 1 if settings.flags[RATE_FEEDBACK] + settings.flags[CURRENT_DELAY] == 2 else 2
+            stuck = history.whole[b, TORSION] == STUCK
+            level = min(level, passed_on(history.whole[b, LEVEL], stuck, gain))
+            chain[reached] = b
+            tolerance = 1e-13 * (1.0 + abs(y[2]) + zero_rates[1] * t)
+            ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, y[2], tolerance)
+            if ints[I_PASSES] > MAX_FACE_LEVELS:
+                return TOO_DEEP
+            follow(settings, history, steps, mode_of(ints, reals, chain), chain, t, y[2])
+        if take_sample(settings, history, steps, ints, reals, t):
+            level = 2
+        if kind >= 0:
+            snap(kind, y, p)
+            level = 2
+        # The last stage is the first of the next step, unless something breaks there.
+        known = level == NO_BREAK and reached < 0
+        if known:
+            for i in range(6):
+                k[0, i] = k[STAGES - 1, i]
+            for i in range(STAGE_COLUMNS):
+                stages[0, i] = stages[STAGES - 1, i]
+        mode = mode_of(ints, reals, chain)
+        if kind >= 0 or level <= 2:
+            after = next_mode(settings, history, steps, mode, kind if kind >= 0 else BARRIER, t, y)
+            enter(ints, after)
+        ints[I_LEVEL] = level

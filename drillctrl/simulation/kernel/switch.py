@@ -1,0 +1,114 @@
+"""Which mode follows an event, from the loads that the contact would have to bear."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from .data import (
+    AXIAL_RATE,
+    DEPTH,
+    DOWN,
+    FORWARD,
+    HELD,
+    HELD_TO_DOWN,
+    HELD_TO_UP,
+    KINDS,
+    LINEAR,
+    P_DEPTH,
+    P_DOWN,
+    P_FORWARD,
+    P_REVERSE,
+    P_UP,
+    PROBES,
+    RELEASE_FORWARD,
+    RELEASE_REVERSE,
+    REVERSE,
+    STUCK,
+    TORSION_RATE,
+    UP,
+    Mode,
+)
+from .model import rate_of_change
+from .physics import rates
+
+
+@numba.njit(cache=True, error_model="numpy")
+def with_branch(mode, contact, torsion, axial):
+    """The mode on another branch."""
+    return Mode(
+        contact,
+        torsion,
+        axial,
+        mode.lag,
+        mode.face,
+        mode.passes,
+        mode.lag0,
+        mode.lag1,
+        mode.lag2,
+        mode.piece,
+        mode.gains,
+        mode.on,
+        mode.held0,
+        mode.held1,
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def snap(kind, y, p):
+    """Make a velocity that has just been found to vanish vanish exactly."""
+    zero = rates((0.0, 0.0, 0.0, 0.0), p)
+    if kind == AXIAL_RATE:
+        y[1] = -zero[0]
+    elif kind == TORSION_RATE:
+        y[3] = -zero[1]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def next_mode(settings, history, steps, mode, kind, t, y):
+    """Return contact, torsion and axial branch after an event, or at the start.
+
+    At Φ' = 0 the bit stays if the torque offered lies between what full friction (and
+    cutting) can bear in either direction, else it goes where it is pushed. Z' = 0 likewise,
+    with a wear-flat force anywhere in [0, λ].
+    """
+    if settings.flags[LINEAR] == 1:
+        return 1, FORWARD, DOWN
+    out, probe = np.empty(6), np.zeros(PROBES)
+    axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.p)
+    push, turn = 1e-13 * settings.scale[HELD_TO_UP], 1e-13 * settings.scale[RELEASE_FORWARD]
+    contact, torsion, axial = mode.contact, mode.torsion, mode.axial
+    at_rest = torsion == STUCK or kind == TORSION_RATE or rotary_rate == 0.0
+    if kind == DEPTH:
+        contact = 1 - contact
+    elif kind >= KINDS:
+        rate_of_change(settings, history, steps, mode, t, y, out, probe)
+        tolerance = 1e-11 * settings.scale[DEPTH]
+        if probe[P_DEPTH] < -tolerance:
+            contact = 0
+        elif probe[P_DEPTH] > tolerance:
+            contact = 1
+    level = axial_rate == 0.0 or (mode.contact == 1 and axial == HELD)
+    if contact == 0:
+        axial = DOWN
+    elif level:
+        # Torque does not enter the axial balance, so this comes first.
+        trial = with_branch(mode, 1, torsion if torsion == REVERSE else STUCK, HELD)
+        rate_of_change(settings, history, steps, trial, t, y, out, probe)
+        axial = HELD
+        if kind == HELD_TO_UP or (kind != HELD_TO_DOWN and probe[P_UP] < -push):
+            axial = UP
+        elif kind == HELD_TO_DOWN or probe[P_DOWN] > push:
+            axial = DOWN
+    else:
+        axial = DOWN if axial_rate > 0.0 else UP
+    if not at_rest:
+        return contact, FORWARD if rotary_rate > 0.0 else REVERSE, axial
+    trial = with_branch(mode, contact, STUCK, axial)
+    rate_of_change(settings, history, steps, trial, t, y, out, probe)
+    torsion = STUCK
+    if kind == RELEASE_FORWARD or (kind != RELEASE_REVERSE and probe[P_FORWARD] > turn):
+        torsion = FORWARD
+    elif kind == RELEASE_REVERSE or probe[P_REVERSE] < -turn:
+        torsion = REVERSE
+    return contact, torsion, axial

@@ -1,0 +1,142 @@
+"""The call that simulates."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+
+from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation.build import kernel
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.setup import FIRST_ROOM, begin, resized, settings_for
+
+MODELS = ("nonlinear", "linear")
+CUTTINGS = ("multiple", "single")
+LONGEST = 1e6
+
+
+def simulate(
+    point: OperatingPoint,
+    controller: Controller | None = None,
+    *,
+    duration: float = 200.0,
+    initial: Mapping[str, float] | None = None,
+    scenario: Scenario | None = None,
+    model: str = "nonlinear",
+    cutting: str = "multiple",
+    rtol: float = 1e-8,
+    atol: float | None = None,
+    max_step: float = math.inf,
+    max_steps: int = 1_000_000,
+) -> Simulation:
+    """Simulate the drill string with state-dependent delay, dry friction and loss of contact.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Where the rig drills at the start.
+    controller : Controller, optional
+        Torque (or axial) feedback.
+    duration : float
+        Dimensionless time to simulate.
+    initial : mapping, optional
+        Perturbation of steady drilling by state name, x, dx, theta, dtheta; short for a
+        `Scenario` that has only this.
+    scenario : Scenario, optional
+        Start, perturbation and changes on the way.
+    model : {"nonlinear", "linear"}
+        Eqs. 1-9, or Eqs. 22 and 34, on which neither friction nor loss of contact acts.
+    cutting : {"multiple", "single"}
+        Whether the rock face is the deepest of all passes before, or the last pass
+        alone (Eq. 7). They agree as long as the bit does not leave the rock.
+    rtol, atol : float
+        Relative and absolute error of a step; ``atol`` is ``rtol``/100 unless given.
+    max_step : float
+        Longest step.
+    max_steps : int
+        The run stops there with status ``"step limit"``.
+
+    Returns
+    -------
+    Simulation
+        A run that cannot go on returns what it has, and its status says why.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
+
+    Notes
+    -----
+    Steps are of the Dormand-Prince pair 5(4) and end at every event and wherever a break of
+    the history meets the delay. Rotation backwards ends the run: Eq. 3 says that nothing is
+    cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
+    over what it had cut already.
+    """
+    duration = checked_number("duration", duration, 0.0, LONGEST, open_low=True)
+    rtol = checked_number("rtol", rtol, 1e-13, 1e-1)
+    atol = checked_number("atol", 1e-2 * rtol if atol is None else atol, 1e-300, 1.0)
+    max_steps = checked_integer("max_steps", max_steps, 1, 100_000_000)
+    if isinstance(max_step, bool) or not isinstance(max_step, int | float) or not max_step > 0.0:
+        raise InputError("max_step", max_step, "positive")
+    if model not in MODELS:
+        raise InputError("model", model, f"one of {', '.join(MODELS)}")
+    if cutting not in CUTTINGS:
+        raise InputError("cutting", cutting, f"one of {', '.join(CUTTINGS)}")
+    if scenario is not None and initial is not None:
+        raise InputError("initial", dict(initial), "left out where there is a scenario")
+    if scenario is None:
+        scenario = Scenario(initial={} if initial is None else dict(initial))
+    linear = model == "linear"
+    if linear and scenario.changes:
+        raise InputError("changes", len(scenario.changes), "left out for the linear model")
+
+    settings = settings_for(
+        point,
+        controller,
+        scenario,
+        duration=duration,
+        linear=linear,
+        multiple=cutting == "multiple",
+        rtol=rtol,
+        atol=atol,
+    )
+    standing = begin(point, settings, scenario, linear, room=min(FIRST_ROOM, max_steps + 2))
+    march, data = kernel("march"), kernel("data")
+    status = {
+        data.DONE: "done",
+        data.COLLAPSE: "step collapse",
+        data.REVERSED: "reverse rotation",
+        data.TOO_DEEP: "face too old",
+        data.NOT_FINITE: "not finite",
+    }
+    started = time.perf_counter()
+    while True:
+        outcome = march.march(*standing, duration, float(max_step))
+        used = int(standing.ints[march.STEPS])
+        if outcome != data.MORE_ROOM or used > max_steps:
+            break
+        room = min(2 * standing.history.real.shape[0], max_steps + 2)
+        standing = standing._replace(history=resized(standing.history, room, used))
+    elapsed = time.perf_counter() - started
+    history = resized(standing.history, used, used)
+    return Simulation(
+        point=point,
+        controller=controller,
+        scenario=scenario,
+        model=model,
+        cutting=cutting,
+        duration=duration,
+        rtol=rtol,
+        atol=atol,
+        status=status.get(outcome, "step limit"),
+        rejected=int(standing.ints[march.REJECTED]),
+        evaluations=int(standing.ints[march.EVALUATIONS]),
+        elapsed_seconds=elapsed,
+        _settings=settings._asdict(),
+        _history=history._asdict(),
+    )

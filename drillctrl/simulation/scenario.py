@@ -1,0 +1,139 @@
+"""What happens to the rig: how it starts, and how speeds and rock change on the way."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import InputError, checked_number
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.plant import STATE_NAMES
+
+FloatArray = npt.NDArray[np.float64]
+STARTS = ("steady", "rest")
+
+
+@dataclass(frozen=True)
+class Change:
+    """A step or ramp of what is imposed on the bit.
+
+    Attributes
+    ----------
+    time : float
+        When it begins.
+    duration : float
+        How long it takes; 0 is a step.
+    omega0 : float, optional
+        Rotary speed of the top end afterwards.
+    penetration_rate : float, optional
+        v0 of the top end afterwards, in the units of the starting point.
+    psi : float, optional
+        Rock strength afterwards, as the ψ of the starting point's rig in that rock. Both
+        cutting force and torque change in proportion; the units stay the starting point's,
+        and so does the wear flat.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or negative.
+    """
+
+    time: float
+    duration: float = 0.0
+    omega0: float | None = None
+    penetration_rate: float | None = None
+    psi: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("time", "duration", "omega0", "penetration_rate", "psi"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, checked_number(name, value, 0.0, 1e9))
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """How the motion starts, and what changes.
+
+    Attributes
+    ----------
+    start : {"steady", "rest"}
+        Steady drilling until t = 0; or a bit at rest that just touches flat rock, unloaded,
+        whose top end sets off at t = 0.
+    initial : mapping
+        Perturbation by state name (x, dx, theta, dtheta) that is added at t = 0.
+    changes : tuple of Change
+        In order of time, none starting before the one before it is complete.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a value is not finite, or changes overlap.
+    """
+
+    start: str = "steady"
+    initial: Mapping[str, float] = field(default_factory=dict)
+    changes: tuple[Change, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.start not in STARTS:
+            raise InputError("start", self.start, f"one of {', '.join(STARTS)}")
+        for name, value in self.initial.items():
+            if name not in STATE_NAMES:
+                raise InputError("initial", name, f"one of {', '.join(STATE_NAMES)}")
+            checked_number(f"initial {name}", value, -1e6, 1e6)
+        changes = tuple(self.changes)
+        object.__setattr__(self, "changes", changes)
+        for before, after in itertools.pairwise(changes):
+            if after.time < before.time + before.duration:
+                raise InputError("changes", after.time, "after the end of the change before")
+
+    def perturbation(self) -> FloatArray:
+        """Return what is added to the state at t = 0, shape (4,)."""
+        return np.array([float(self.initial.get(name, 0.0)) for name in STATE_NAMES])
+
+    def drive(self, point: OperatingPoint) -> FloatArray:
+        """Return the motion of the top end and the rock strength, piece by piece.
+
+        Returns
+        -------
+        array, (m, 9)
+            Start; offset, speed and acceleration of the top end beyond v0 t, then beyond
+            ω0 t; strength relative to the point's, and its slope.
+        """
+        rows: list[list[float]] = []
+        time, offsets = 0.0, np.zeros(2)
+        now = np.array([point.penetration_rate, point.omega0, 1.0])
+        usual = np.array([point.penetration_rate, point.omega0])
+
+        def piece(start: float, end: float, target: FloatArray) -> None:
+            nonlocal now, offsets, time
+            span = end - start
+            slope = (target - now) / span if span > 0.0 else np.zeros(3)
+            if span > 0.0:
+                beyond = now[:2] - usual
+                axial = [offsets[0], beyond[0], slope[0]]
+                torsional = [offsets[1], beyond[1], slope[1]]
+                rows.append([start, *axial, *torsional, now[2], slope[2]])
+                offsets = offsets + span * (beyond + 0.5 * span * slope[:2])
+            now, time = target, end
+
+        for change in self.changes:
+            if change.psi is not None and point.psi == 0.0:
+                raise InputError("psi", change.psi, "left out where the point's psi is 0")
+            piece(time, change.time, now)
+            target = now.copy()
+            if change.penetration_rate is not None:
+                target[0] = change.penetration_rate
+            if change.omega0 is not None:
+                target[1] = change.omega0
+            if change.psi is not None:
+                target[2] = change.psi / point.psi
+            piece(time, time + change.duration, target)
+        # The last piece has no end; its length does not enter its row.
+        piece(time, time + 1.0, now)
+        return np.array(rows)

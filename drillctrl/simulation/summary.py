@@ -1,0 +1,162 @@
+"""The figures of a motion: settled or not, stick, period, extremes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from drillctrl.simulation.result import Motion, Simulation
+
+FloatArray = npt.NDArray[np.float64]
+SETTLED = 1e-3
+RETURNED = 1e-3
+PER_STEP = 9
+MAX_RETURNS = 40
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures over the last quarter of a run, unless said otherwise.
+
+    Attributes
+    ----------
+    settled : bool
+        Whether the largest |x| and |θ| are below 1e-3 of their largest over the whole run.
+    stick_fraction : float
+        Share of the time in torsional stick.
+    period : float or None
+        Of the orbit, if the motion repeats within 1e-3 of its amplitude and is not settled.
+    bit_speed_min, bit_speed_max : float
+        Extremes of Φ'.
+    axial_min, axial_max : float
+        Extremes of x.
+    delay_max : float
+        Largest τ.
+    max_abs_u : float
+        Largest input over the whole run.
+    lost_contact : bool
+        Whether the bit left the rock.
+    axial_stick_fraction : float
+        Share of the time held at Z' = 0 in contact.
+    events, steps : int
+        Numbers of events and of steps over the whole run.
+    elapsed_seconds : float
+        Wall time of the integration.
+    """
+
+    settled: bool
+    stick_fraction: float
+    period: float | None
+    bit_speed_min: float
+    bit_speed_max: float
+    axial_min: float
+    axial_max: float
+    delay_max: float
+    max_abs_u: float
+    lost_contact: bool
+    axial_stick_fraction: float
+    events: int
+    steps: int
+    elapsed_seconds: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields by name."""
+        return asdict(self)
+
+
+def summarise(simulation: Simulation) -> Summary:
+    """Return the figures of a run."""
+    end = float(simulation.times[-1])
+    since = 0.75 * end
+    if simulation.steps == 0:
+        tail = run = simulation.at([0.0])
+    else:
+        run = simulation.on_steps(PER_STEP)
+        # The run is in order of time; its tail starts with the step that holds `since`.
+        tail = simulation.on_steps(PER_STEP, since)
+    settled = all(
+        float(abs(getattr(tail, name)).max()) <= SETTLED * float(abs(getattr(run, name)).max())
+        for name in ("x", "theta")
+    )
+    omega0 = simulation.point.omega0
+    return Summary(
+        settled=settled,
+        stick_fraction=_share(simulation, "stuck", since, end),
+        period=None if settled else period(simulation, since),
+        bit_speed_min=omega0 + _extreme(simulation, tail, "dtheta", least=True),
+        bit_speed_max=omega0 + _extreme(simulation, tail, "dtheta"),
+        axial_min=_extreme(simulation, tail, "x", least=True),
+        axial_max=_extreme(simulation, tail, "x"),
+        delay_max=_extreme(simulation, tail, "delay"),
+        max_abs_u=float(max(abs(run.axial).max(), abs(run.torque).max())),
+        lost_contact=not bool(tail.contact.all()),
+        axial_stick_fraction=_share(simulation, "held", since, end),
+        events=len(simulation.events),
+        steps=simulation.steps,
+        elapsed_seconds=simulation.elapsed_seconds,
+    )
+
+
+def _share(simulation: Simulation, phase: str, since: float, end: float) -> float:
+    """Share of [since, end] spent in a phase."""
+    if end <= since:
+        return 0.0
+    spent = sum(max(0.0, b - max(a, since)) for a, b in simulation.phases(phase))
+    return spent / (end - since)
+
+
+def _extreme(simulation: Simulation, tail: Motion, name: str, *, least: bool = False) -> float:
+    """Extreme of a quantity, looked for again between the samples around the extreme one."""
+    sign = -1.0 if least else 1.0
+    values = sign * getattr(tail, name)
+    k = int(values.argmax())
+    low, high = tail.times[max(k - 1, 0)], tail.times[min(k + 1, values.size - 1)]
+    best = float(values[k])
+    if high > low:
+        finer = simulation.at(np.linspace(low, high, 65))
+        best = max(best, float((sign * getattr(finer, name)).max()))
+    return sign * best
+
+
+def section_crossings(simulation: Simulation, since: float) -> FloatArray:
+    """Return the times at which θ rises through the middle of its range, by bisection."""
+    tail = simulation.on_steps(PER_STEP, since)
+    middle = 0.5 * (tail.theta.max() + tail.theta.min())
+    beyond = tail.theta - middle
+    rising = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
+    low, high = tail.times[rising].copy(), tail.times[rising + 1].copy()
+    for _ in range(50):
+        centre = 0.5 * (low + high)
+        if centre.size == 0:
+            break
+        before = simulation.at(centre).theta < middle
+        low, high = np.where(before, centre, low), np.where(before, high, centre)
+    return 0.5 * (low + high)
+
+
+def period(simulation: Simulation, since: float) -> float | None:
+    """Return the time after which the motion since some instant repeats, or None.
+
+    The states at the crossings of a section are compared with those so many crossings later.
+    """
+    if simulation.steps == 0:
+        return None
+    times = section_crossings(simulation, since)
+    if times.size < 3:
+        return None
+    tail = simulation.on_steps(PER_STEP, since)
+    motion = simulation.at(times)
+    names = ("x", "dx", "theta", "dtheta")
+    states = np.stack([getattr(motion, name) for name in names])
+    size = np.array([np.ptp(getattr(tail, name)) for name in names])[:, None]
+    if not (size > 0.0).all():
+        return None
+    for count in range(1, min(times.size - 1, MAX_RETURNS)):
+        apart = abs(states[:, count:] - states[:, :-count]) / size
+        if apart.max() < RETURNED:
+            return float((times[count:] - times[:-count]).mean())
+    return None

@@ -1,0 +1,256 @@
+"""Spectral abscissas of very many systems of one shape in a few compiled calls."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.delay_system import DelaySystem, plant_system
+from drillctrl.errors import InputError
+from drillctrl.feedback import FeedbackStructure, loop_channels
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.plant import (
+    INPUT_NAMES,
+    PARAMETER_NAMES,
+    dimensionless_plant,
+    linearisation,
+    parameter_vector,
+)
+from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.pseudospectral import _blocks, degree_for_reach
+from drillctrl.spectrum.roots import EPSILON, spectral_abscissa
+
+_CHUNK = 512
+
+
+def batch_abscissas(
+    A0: FloatArray,
+    left: FloatArray,
+    right: FloatArray,
+    delay: FloatArray,
+    workers: int | None = None,
+) -> FloatArray:
+    """Return the spectral abscissas of q systems X' = A0 X + L R X(t − τ).
+
+    Parameters
+    ----------
+    A0 : array, (q, n, n)
+        Undelayed matrices.
+    left, right : array, (q, n, r) and (q, r, n)
+        Factors of the delayed matrices.
+    delay : array, (q,)
+        τ > 0.
+    workers : int, optional
+        Threads; by default one for each core. The result does not depend on it.
+
+    Returns
+    -------
+    array, (q,)
+        α of each, by the same collocation and iteration as `spectral_abscissa`; those few
+        that do not converge here, close to multiple roots, are handed to it.
+    """
+    count = A0.shape[0]
+    n = A0.shape[1]
+    for name, array, shape in (
+        ("left", left, (count, n, right.shape[1])),
+        ("right", right, (count, left.shape[2], n)),
+        ("delay", delay, (count,)),
+    ):
+        if array.shape != shape:
+            raise InputError(name, f"array of shape {array.shape}", f"of shape {shape}")
+    finite = all(np.isfinite(array).all() for array in (A0, left, right, delay))
+    if not finite or not (delay > 0).all():
+        raise InputError("A0, left, right, delay", "arrays", "finite, with delay > 0")
+    degrees = _degrees(A0, left, right, delay)
+    alpha = np.empty(count)
+    jobs = []
+    for degree in np.unique(degrees):
+        members = np.flatnonzero(degrees == degree)
+        jobs += [(int(degree), members[i : i + _CHUNK]) for i in range(0, members.size, _CHUNK)]
+
+    def solve(job: tuple[int, npt.NDArray[np.intp]]) -> None:
+        degree, rows = job
+        alpha[rows] = _solve(A0[rows], left[rows], right[rows], delay[rows], degree)
+
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        list(pool.map(solve, jobs))
+    for row in np.flatnonzero(np.isnan(alpha)):
+        system = DelaySystem(
+            A0[row],
+            (left[row] @ right[row],),
+            (float(delay[row]),),
+            np.zeros((n, 0)),
+            np.zeros((0, n)),
+        )
+        alpha[row] = spectral_abscissa(system)
+    return alpha
+
+
+def _degrees(
+    A0: FloatArray, left: FloatArray, right: FloatArray, delay: FloatArray
+) -> npt.NDArray[np.intp]:
+    """Choose a degree for each system, from few values so that groups are large."""
+    total = np.abs(A0) + np.exp(0.5) * np.abs(left @ right)
+    bound = np.abs(np.linalg.eigvals(total)).max(axis=1)
+    exact = np.array([degree_for_reach(reach) for reach in bound * delay])
+    ladder = np.unique(np.round(4 * 1.15 ** np.arange(40)).astype(int))
+    return np.asarray(ladder[np.minimum(np.searchsorted(ladder, exact), ladder.size - 1)])
+
+
+def _solve(
+    A0: FloatArray, left: FloatArray, right: FloatArray, delay: FloatArray, degree: int
+) -> FloatArray:
+    """Return α of each system, NaN where the iteration is not sure of it."""
+    count, n, rank = left.shape
+    past, present = _blocks(degree, rank)
+    size = n + degree * rank
+    matrix = np.zeros((count, size, size))
+    matrix[:, :n, :n] = A0
+    matrix[:, n:, n:] = past / delay[:, None, None]
+    matrix[:, n:, :n] = present @ (right / delay[:, None, None])
+    matrix[:, :n, size - rank :] += left
+    values = np.linalg.eigvals(matrix).astype(complex)
+    values = np.where(values.imag >= 0, values, -np.inf)
+    order = np.argsort(-values.real, axis=1, kind="stable")[:, :3]
+    start = np.take_along_axis(values, order, axis=1)
+    s = start[:, :2]
+    delayed = left @ right
+    gap = np.abs(s[:, 0] - s[:, 1])
+    sure = np.zeros(s.shape, dtype=bool)
+    # Two candidates: the collocation may have exchanged the first two.
+    for _ in range(4):
+        newton = 1.0 / _log_derivative(A0, delayed, delay, s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pull = np.where(s.imag > 0, 1.0 / (2j * s.imag), 0.0)
+            step = newton / (1.0 - newton * pull)
+        step = np.where(sure, 0.0, step)
+        s = s - step
+        near = np.minimum(gap[:, None], np.where(s.imag > 0, 2 * np.abs(s.imag), np.inf))
+        scale = 1.0 + np.abs(s)
+        sure |= np.abs(step) ** 2 <= EPSILON * scale * np.minimum(near, scale)
+        if sure.all():
+            break
+    alpha = s.real.max(axis=1)
+    strayed = np.abs(s - start[:, :2]) > 1e-2 * (1.0 + np.abs(s))
+    tight = (gap < 0.05 * (1.0 + np.abs(s[:, 0]))) | ((s.imag > 0) & (s.imag < 0.05)).any(axis=1)
+    third = start[:, 2].real > alpha - 1e-3 * (1.0 + np.abs(alpha))
+    doubtful = ~sure.all(axis=1) | strayed.any(axis=1) | tight | third
+    # A second candidate far to the left may wander; only the first one counts then.
+    far = start[:, 1].real < start[:, 0].real - 0.1 * (1.0 + np.abs(start[:, 0]))
+    single = far & sure[:, 0] & ~strayed[:, 0] & (s[:, 0].imag == 0)
+    single |= far & sure[:, 0] & ~strayed[:, 0] & (s[:, 0].imag > 0.05)
+    alpha = np.where(single, s[:, 0].real, alpha)
+    return np.where(doubtful & ~single | ~np.isfinite(alpha), np.nan, alpha)
+
+
+def _log_derivative(
+    A0: FloatArray, delayed: FloatArray, delay: FloatArray, s: ComplexArray
+) -> ComplexArray:
+    """Return tr(Δ⁻¹ Δ') of each system at its own points, shape (q, k)."""
+    factor = np.exp(-np.maximum(s.real, -1e3 / delay[:, None]) * delay[:, None])
+    factor = factor * np.exp(-1j * s.imag * delay[:, None])
+    identity = np.eye(A0.shape[1])
+    term = factor[..., None, None] * delayed[:, None]
+    delta = s[..., None, None] * identity - A0[:, None] - term
+    slope = identity + delay[:, None, None, None] * term
+    try:
+        inverse = np.linalg.inv(delta)
+    except np.linalg.LinAlgError:
+        # Some s is a root to the last bit; the step from beside it leads back.
+        beside = s + 1e-15 * (1.0 + np.abs(s))
+        return _log_derivative(A0, delayed, delay, beside)
+    return np.asarray(np.einsum("qkij,qkji->qk", inverse, slope))
+
+
+def spectral_abscissas(
+    point: OperatingPoint,
+    parameters: Mapping[str, npt.ArrayLike] | None = None,
+    structure: FeedbackStructure | None = None,
+    gains: npt.ArrayLike | None = None,
+    workers: int | None = None,
+) -> FloatArray:
+    """Return α for many operating points, many gains, or both side by side.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Supplies the parameters that do not vary.
+    parameters : mapping of str to array_like, (q,), optional
+        Values of the parameters that vary, by name.
+    structure : FeedbackStructure, optional
+        Without it the open loop.
+    gains : array_like, (q, k) or (k,), optional
+        Gain vectors of the structure.
+    workers : int, optional
+        Threads; by default one for each core.
+
+    Returns
+    -------
+    array, (q,)
+        Spectral abscissas.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, lengths differ or a value is out of range.
+    """
+    varied = {name: np.atleast_1d(np.asarray(v, float)) for name, v in (parameters or {}).items()}
+    vectors = None
+    if structure is not None:
+        vectors = np.atleast_2d(np.asarray(gains, dtype=float))
+        if vectors.shape[1] != structure.lower.size or not np.isfinite(vectors).all():
+            raise InputError(
+                "gains",
+                f"array of shape {vectors.shape}",
+                f"finite, with {structure.lower.size} columns",
+            )
+    lengths = {v.size for v in varied.values()} | (set() if vectors is None else {len(vectors)})
+    count = max(lengths, default=1)
+    if not lengths <= {1, count}:
+        raise InputError("parameters", sorted(lengths), "arrays of one length")
+    table = np.tile(parameter_vector(point)[:, None], (1, count))
+    for name, values in varied.items():
+        if name not in PARAMETER_NAMES:
+            raise InputError("parameters", name, f"one of {', '.join(PARAMETER_NAMES)}")
+        # The two ends of the range decide whether all of it is permitted.
+        for value in (values.min(), values.max()):
+            point.with_changes(**{name: float(value)})
+        table[PARAMETER_NAMES.index(name)] = values
+    a0, left, right, delay = _plant_arrays(table)
+    if structure is not None and vectors is not None:
+        nominal = plant_system(point, INPUT_NAMES)
+        drive, measure = loop_channels(nominal, structure)
+        now, past = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
+        a0 = a0 + drive @ now @ measure
+        if past.any():
+            left = np.concatenate([left, np.broadcast_to(drive, (count, *drive.shape))], axis=2)
+            right = np.concatenate([right, past @ measure], axis=1)
+    return batch_abscissas(a0, left, right, delay, workers)
+
+
+def _plant_arrays(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return A0, the factors of A1 and τ0 for every column of parameters."""
+    count = table.shape[1]
+    mapped = linearisation(dimensionless_plant()).map(count)
+    a1, a2, _, tau = (value.full() for value in mapped(table))
+    a1 = a1.reshape(4, count, 4).transpose(1, 0, 2)
+    a2 = a2.reshape(4, count, 4).transpose(1, 0, 2)
+    # The plant delays one signal: every row of A2 is a multiple of its last.
+    right = a2[:, 3:, :]
+    left = a2 @ right.transpose(0, 2, 1) / (right**2).sum(axis=2, keepdims=True)
+    return a1, left, right, tau.ravel()
+
+
+def _gain_arrays(
+    structure: FeedbackStructure, vectors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return K1 and K2 for every gain vector, each (q, m, p)."""
+    flat = np.tile(structure.flat_lower, (len(vectors), 1))
+    flat[:, structure.free] = vectors
+    half = flat.shape[1] // 2
+    shape = (len(vectors), *structure.K1_lower.shape)
+    return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)

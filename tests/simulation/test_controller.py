@@ -1,0 +1,103 @@
+"""The controller as software, and what the rig is told to do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation import Change, Controller, Scenario, simulate
+
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+GAINS = ("case1", [-3.82], [3.61])
+KICK = {"dx": 1.0, "dtheta": 1.0}
+TIMES = np.linspace(0.0, 20.0, 801)
+
+
+def theta(controller, **options):
+    return simulate(POINT, controller, duration=20.0, initial=KICK, **options).at(TIMES).theta
+
+
+@pytest.mark.parametrize(
+    ("name", "sizes", "order"),
+    [
+        ("period", (0.02, 0.01, 0.005), 1),
+        ("actuator_lag", (0.02, 0.01, 0.005), 1),
+        ("measurement_delay", (0.02, 0.01, 0.005), 1),
+    ],
+)
+def test_imperfections_vanish_with_their_size(name, sizes, order):
+    ideal = theta(Controller(*GAINS))
+    apart = [abs(theta(Controller(*GAINS, **{name: size})) - ideal).max() for size in sizes]
+    ratios = np.array(apart[:-1]) / apart[1:]
+    np.testing.assert_allclose(ratios, 2.0**order, rtol=0.25)
+
+
+def test_sampled_command_is_the_law_at_the_samples():
+    controller = Controller(*GAINS, period=0.1, activation=1.0)
+    run = simulate(POINT, controller, duration=10.0, initial=KICK)
+    samples = 1.0 + 0.1 * np.arange(60)
+    measured = run.at(samples).theta
+    delayed = run.at(samples - POINT.delay).theta
+    applied = run.at(samples + 0.05).torque
+    np.testing.assert_allclose(applied, -3.82 * measured + 3.61 * delayed, atol=1e-9)
+    assert not run.at(np.linspace(0.0, 0.99, 10)).torque.any()
+
+
+def test_limits_hold_and_are_reached():
+    limited = Controller(*GAINS, limit=0.3)
+    run = simulate(POINT, limited, duration=20.0, initial=KICK)
+    assert run.summary.max_abs_u == pytest.approx(0.3)
+    ideal = theta(Controller(*GAINS))
+    np.testing.assert_allclose(theta(Controller(*GAINS, limit=1e6)), ideal, atol=1e-9)
+
+
+def test_rate_limit_sampled_and_of_the_actuator():
+    sampled = Controller(*GAINS, period=0.05, rate_limit=1.0)
+    held = simulate(POINT, sampled, duration=10.0, initial=KICK)
+    steps = np.diff(held.at(0.025 + 0.05 * np.arange(190)).torque)
+    assert abs(steps).max() == pytest.approx(0.05, rel=1e-9)
+    lagging = Controller(*GAINS, actuator_lag=0.05, rate_limit=1.0)
+    torque = simulate(POINT, lagging, duration=10.0, initial=KICK).at(TIMES[:401]).torque
+    assert 0.9 < (abs(np.diff(torque)) / np.diff(TIMES[:401])).max() < 1.0 + 1e-6
+
+
+def test_noise_is_repeatable_and_seeded():
+    def motion(seed):
+        return theta(Controller(*GAINS, period=0.1, noise={"theta": 0.05}, seed=seed))
+
+    np.testing.assert_array_equal(motion(1), motion(1))
+    assert abs(motion(1) - motion(2)).max() > 1e-3
+
+
+def test_delay_of_small_motion_is_fixed_or_current_alike():
+    def run(delay, size):
+        controller = Controller(*GAINS, delay=delay)
+        initial = {"dx": size, "dtheta": size}
+        return simulate(POINT, controller, duration=20.0, initial=initial, rtol=1e-11)
+
+    apart = [
+        abs(run("fixed", size).at(TIMES).theta - run("current", size).at(TIMES).theta).max()
+        for size in (1e-1, 1e-2)
+    ]
+    assert apart[0] / apart[1] == pytest.approx(100.0, rel=0.2)
+
+
+def test_schedule_changes_the_gains():
+    later = Controller("p", [0.0], schedule=((5.0, [-2.0], None),))
+    run = simulate(POINT, later, duration=10.0, initial=KICK).at([4.0, 6.0])
+    np.testing.assert_allclose(run.torque, [0.0, -2.0 * run.theta[1]], atol=1e-12)
+
+
+@pytest.mark.parametrize("duration", [0.0, 10.0])
+def test_changes_lead_to_the_steady_state_of_the_new_point(duration):
+    start, goal = OperatingPoint(10.0, 1.0, 14.0), OperatingPoint(12.0, 1.1, 18.0)
+    change = Change(5.0, duration, goal.omega0, goal.penetration_rate, goal.psi)
+    run = simulate(start, duration=900.0, scenario=Scenario(changes=(change,)))
+    end = run.at(np.linspace(890.0, 900.0, 50))
+    np.testing.assert_allclose(start.omega0 + end.dtheta, goal.omega0, rtol=2e-2)
+    np.testing.assert_allclose(start.penetration_rate + end.dx, goal.penetration_rate, rtol=2e-2)
+    depth = 2.0 * np.pi * goal.delta0
+    np.testing.assert_allclose(end.depth, depth, rtol=1e-2)
+    # The wear flat stays the starting point's.
+    np.testing.assert_allclose(end.weight_on_bit, goal.psi * depth + start.lam, rtol=1e-2)

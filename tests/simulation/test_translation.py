@@ -1,0 +1,118 @@
+"""The generated kernel computes what CasADi computes."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.plant import (
+    branch_functions,
+    dimensionless_plant,
+    parameter_vector,
+    rhs_function,
+)
+from drillctrl.simulation.build import kernel
+from drillctrl.simulation.translate import translate
+
+RNG = np.random.default_rng(7)
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+
+
+def as_python(function: ca.Function):
+    """Compile a translation as plain Python."""
+    space = {"math": math}
+    exec(translate(function), space)
+    return space[function.name()]
+
+
+def arguments(function: ca.Function) -> list:
+    sizes = [function.nnz_in(i) for i in range(function.n_in())]
+    values = [RNG.normal(size=size) * 3.0 for size in sizes]
+    values[-1] = parameter_vector(POINT) * RNG.uniform(0.5, 2.0, 9)
+    return values
+
+
+def plain(values: list) -> list:
+    return [float(v[0]) if v.size == 1 else tuple(v.tolist()) for v in values]
+
+
+@pytest.mark.parametrize("index", range(6))
+def test_compiled_physics_equals_casadi(index):
+    function = branch_functions()[index]
+    compiled = getattr(kernel("physics"), function.name())
+    for _ in range(50):
+        values = arguments(function)
+        expected = function(*values).full().ravel()
+        result = np.atleast_1d(compiled(*plain(values)))
+        np.testing.assert_allclose(result, expected, rtol=1e-13, atol=1e-13)
+
+
+def test_translation_of_switches_equals_casadi():
+    function = rhs_function(dimensionless_plant())
+    translated = as_python(function)
+    seen = set()
+    for _ in range(300):
+        values = arguments(function)
+        # Both sides of every switch, and the switches themselves.
+        values[0][1] = RNG.choice([-1.0, 0.0, 1.0]) * 25.0 - values[-1][0] * values[-1][1]
+        values[0][3] = RNG.choice([-2.0, 0.0, 2.0]) - values[-1][0]
+        expected = function(*values).full().ravel()
+        np.testing.assert_allclose(translated(*plain(values)), expected, rtol=1e-12, atol=1e-12)
+        seen.add(tuple(np.sign(np.round(expected, 6))))
+    assert len(seen) > 4
+
+
+def test_every_elementary_operation():
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    expressions = [
+        ca.sin(x) + ca.cos(y) * ca.tan(x / 4),
+        ca.exp(x) - ca.sqrt(ca.fabs(y)) + ca.log(1 + x**2),
+        ca.fmin(x, y) - ca.fmax(x, 2 * y) + ca.tanh(y),
+        ca.if_else(ca.logic_and(x < y, y > 0), x * x, -1 / (3 + y)),
+        ca.if_else(ca.logic_or(x <= y, ca.logic_not(y > 0)), ca.sign(x), x**3),
+        (2 + ca.sin(x)) ** y,
+    ]
+    function = ca.Function("f", [x, y], [ca.vertcat(*expressions)])
+    translated = as_python(function)
+    for a, b in RNG.normal(size=(100, 2)):
+        np.testing.assert_allclose(
+            translated(a, b), function(a, b).full().ravel(), rtol=1e-13, atol=1e-13
+        )
+
+
+def test_unknown_operation_is_refused():
+    x = ca.SX.sym("x")
+    with pytest.raises(NotImplementedError, match="operation"):
+        translate(ca.Function("f", [x], [ca.erf(x)]))
+
+
+@pytest.mark.parametrize("torsion", ["FORWARD", "REVERSE"])
+@pytest.mark.parametrize("axial", ["DOWN", "UP"])
+@pytest.mark.parametrize("contact", [0, 1])
+def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
+    data, model = kernel("data"), kernel("model")
+    p = parameter_vector(POINT)
+    tau = 0.2
+    z_rate = 3.0 if axial == "DOWN" else -3.0
+    turn = 4.0 if torsion == "FORWARD" else -4.0
+    state = np.array([1.5, z_rate - 25.0, 0.3, turn - 10.0])
+    depth = 9.0 if contact else -9.0
+    then = np.zeros(4)
+    then[0] = state[0] + 25.0 * tau - depth / 4.0
+    expected = rhs_function(dimensionless_plant())(state, then, tau, [0.1, 0.2], p).full().ravel()
+    result = model.branch_acceleration(
+        tuple(state),
+        (0.1, 0.2),
+        (0.0, 0.0),
+        depth,
+        contact,
+        getattr(data, torsion),
+        getattr(data, axial),
+        tuple(p),
+        np.zeros(data.PROBES),
+    )
+    np.testing.assert_allclose(result, expected[[1, 3]], rtol=1e-12)
