@@ -114,7 +114,7 @@ class Design:
             raise InputError("design", "not a stabilised loop", "one, to have an alternative")
         began = time.perf_counter()
         family = loop_family(plant_system(self.point, self.structure.inputs), self.structure)
-        here = np.concatenate([self.K1.ravel(), self.K2.ravel()])[self.structure.free]
+        here = self.structure.vector(self.K1, self.K2)
         perturbed = [
             loop_family(plant, self.structure, family.degree)
             for plant in perturbed_plants(self.point, self.structure)

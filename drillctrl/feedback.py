@@ -17,12 +17,30 @@ ANGLE_BOUND = 10.0
 RATE_BOUND = 5.0
 
 
+@dataclass(frozen=True)
+class Tie:
+    """One gain that follows another: ``gain`` = ``factor`` · ``leader``.
+
+    Attributes
+    ----------
+    gain, leader : str
+        Names such as ``K2_1``; the leader is itself not tied.
+    factor : float
+        Not zero.
+    """
+
+    gain: str
+    leader: str
+    factor: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class FeedbackStructure:
     """Which outputs are fed back to which inputs, now and delayed, and within what bounds.
 
-    An entry of a gain matrix whose lower and upper bounds coincide is fixed; all others
-    are free. The free gains, K1 before K2 and row by row, form the gain vector.
+    An entry of a gain matrix whose lower and upper bounds coincide is fixed, one that is
+    tied follows its leader; all others are free. The free gains, K1 before K2 and row by
+    row, form the gain vector.
 
     Attributes
     ----------
@@ -36,11 +54,14 @@ class FeedbackStructure:
         Bounds of the gains on Y(t − τ).
     inputs : tuple of str
         Names of the inputs that are driven, m of them.
+    ties : tuple of Tie
+        Gains that follow others, within the bounds of both.
 
     Raises
     ------
     InputError
-        If shapes do not fit, a bound is not finite, or bounds are swapped.
+        If shapes do not fit, a bound is not finite, bounds are swapped, or a tie names no
+        free gain or leaves its leader no room.
     """
 
     name: str
@@ -50,6 +71,7 @@ class FeedbackStructure:
     K2_lower: FloatArray
     K2_upper: FloatArray
     inputs: tuple[str, ...] = ("torque",)
+    ties: tuple[Tie, ...] = ()
 
     def __post_init__(self) -> None:
         shape = (len(self.inputs), len(self.outputs))
@@ -69,6 +91,26 @@ class FeedbackStructure:
                     f"{low[low > high][0]:g}:{high[low > high][0]:g}",
                     "given as lower:upper with lower ≤ upper",
                 )
+        self._check_ties()
+
+    def _check_ties(self) -> None:
+        """Refuse ties between gains that are not free, and leaders left without room."""
+        bounded = self.flat_lower < self.flat_upper
+        known = {n for n, free in zip(self.entry_names, bounded, strict=True) if free}
+        followers = {tie.gain for tie in self.ties}
+        for tie in self.ties:
+            for name in (tie.gain, tie.leader):
+                if name not in known:
+                    raise InputError("tie", name, f"one of the gains {', '.join(sorted(known))}")
+            if tie.leader in followers:
+                raise InputError("tie", tie.leader, "a leader that is not tied itself")
+            if checked_number(f"factor of the tie of {tie.gain}", tie.factor) == 0.0:
+                raise InputError(f"factor of the tie of {tie.gain}", 0.0, "not zero")
+        if len(followers) < len(self.ties):
+            raise InputError("ties", [tie.gain for tie in self.ties], "one for each gain")
+        for name, low, high in zip(self.gain_names, self.lower, self.upper, strict=True):
+            if low >= high:
+                raise InputError(f"bound {name}", f"{low:g}:{high:g}", "wider, with its ties")
 
     @property
     def flat_lower(self) -> FloatArray:
@@ -81,40 +123,76 @@ class FeedbackStructure:
         return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
 
     @property
-    def lower(self) -> FloatArray:
-        """Lower bounds of the gain vector, shape (k,)."""
-        return self.flat_lower[self.free]
-
-    @property
-    def upper(self) -> FloatArray:
-        """Upper bounds of the gain vector, shape (k,)."""
-        return self.flat_upper[self.free]
+    def entry_names(self) -> tuple[str, ...]:
+        """Names of all entries of K1, then K2: ``K1_1``, or ``K1_1_1`` with several inputs."""
+        rows, columns = self.K1_lower.shape
+        return tuple(
+            f"{gain}_{j + 1}" if rows == 1 else f"{gain}_{i + 1}_{j + 1}"
+            for gain in ("K1", "K2")
+            for i in range(rows)
+            for j in range(columns)
+        )
 
     @property
     def free(self) -> BoolArray:
         """Which entries of (K1, K2), flattened, are free; shape (2 m p,)."""
-        return np.asarray(self.flat_lower < self.flat_upper)
+        followers = {tie.gain for tie in self.ties}
+        leads = [name not in followers for name in self.entry_names]
+        return np.asarray((self.flat_lower < self.flat_upper) & np.array(leads, dtype=bool))
 
     @property
     def gain_names(self) -> tuple[str, ...]:
-        """Names of the free gains, ``K1_1`` and so on, in the order of the vector."""
-        shape = self.K1_lower.shape
-        one_row = shape[0] == 1
-        names = [
-            f"{gain}_{j + 1}" if one_row else f"{gain}_{i + 1}_{j + 1}"
-            for gain in ("K1", "K2")
-            for i in range(shape[0])
-            for j in range(shape[1])
-        ]
-        return tuple(name for name, free in zip(names, self.free, strict=True) if free)
+        """Names of the free gains in the order of the vector."""
+        return tuple(n for n, free in zip(self.entry_names, self.free, strict=True) if free)
+
+    @property
+    def spread(self) -> FloatArray:
+        """How each entry of (K1, K2), flattened, follows the gain vector, (2 m p, k)."""
+        names, columns = self.entry_names, self.gain_names
+        table = np.zeros((len(names), len(columns)))
+        for j, name in enumerate(columns):
+            table[names.index(name), j] = 1.0
+        for tie in self.ties:
+            table[names.index(tie.gain), columns.index(tie.leader)] = tie.factor
+        return table
+
+    @property
+    def fixed(self) -> FloatArray:
+        """The fixed entries of (K1, K2), flattened; 0 where an entry is free or tied."""
+        return np.where(self.flat_lower < self.flat_upper, 0.0, self.flat_lower)
+
+    @property
+    def lower(self) -> FloatArray:
+        """Lower bounds of the gain vector, those of tied gains included, shape (k,)."""
+        return self._limits()[0]
+
+    @property
+    def upper(self) -> FloatArray:
+        """Upper bounds of the gain vector, those of tied gains included, shape (k,)."""
+        return self._limits()[1]
+
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        table = self.spread
+        low, high = self.flat_lower[:, None], self.flat_upper[:, None]
+        acts = table != 0.0
+        factor = np.where(acts, table, 1.0)
+        ends = np.sort(np.stack([low / factor, high / factor]), axis=0)
+        return (
+            np.where(acts, ends[0], -np.inf).max(axis=0),
+            np.where(acts, ends[1], np.inf).min(axis=0),
+        )
 
     def gains(self, vector: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return K1 and K2, each (m, p), from a vector of the free gains."""
-        flat = self.flat_lower
-        flat[self.free] = vector
+        flat = self.fixed + self.spread @ np.asarray(vector, dtype=float)
         half = flat.size // 2
         shape = self.K1_lower.shape
         return flat[:half].reshape(shape), flat[half:].reshape(shape)
+
+    def vector(self, K1: npt.ArrayLike, K2: npt.ArrayLike) -> FloatArray:
+        """Return the vector of the free gains in given matrices, the inverse of `gains`."""
+        flat = np.concatenate([np.ravel(K1), np.ravel(K2)])
+        return np.asarray(flat[self.free], dtype=float)
 
     def with_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> FeedbackStructure:
         """Return the structure with other bounds.
@@ -216,7 +294,7 @@ def gain_matrices(
         if not np.isfinite(flat).all():
             raise InputError(name, flat.tolist(), "finite")
         matrices.append(flat.reshape(shape))
-    unused = ~feedback.free[shape[0] * shape[1] :] & (feedback.K2_upper.ravel() == 0.0)
+    unused = (feedback.K2_lower.ravel() == 0.0) & (feedback.K2_upper.ravel() == 0.0)
     if matrices[1].ravel()[unused].any():
         raise InputError("K2", matrices[1].ravel().tolist(), f"0 for structure {feedback.name}")
     return matrices[0], matrices[1]

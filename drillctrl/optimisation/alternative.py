@@ -6,26 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drillctrl.optimisation.descent import Objective, bfgs
+from drillctrl.optimisation.descent import bfgs
 from drillctrl.optimisation.family import LoopFamily
+from drillctrl.optimisation.measures import worst_case
 from drillctrl.spectrum.characteristic import FloatArray
 
 _PENALTY = 20.0
-
-
-def worst_case(families: Sequence[LoopFamily]) -> Objective:
-    """Return the largest spectral abscissa over several families of loops, as an objective.
-
-    Parameters
-    ----------
-    families : sequence of LoopFamily
-        The same structure around different plants.
-    """
-
-    def objective(gains: FloatArray) -> tuple[float, FloatArray]:
-        return max((f.abscissa(gains) for f in families), key=lambda result: result[0])
-
-    return objective
 
 
 def robust_alternative(

@@ -44,7 +44,7 @@ def explicit_candidates(
     array, (q, k)
         Empty where the equations are not affine.
     """
-    k = family.drive.shape[1]
+    k = family.spread.shape[1]
     if not is_affine(family):
         return np.zeros((0, k))
     depth = deepest * (np.arange(_ABSCISSAS) + 0.5) / _ABSCISSAS + 0.25
@@ -70,7 +70,7 @@ def explicit_candidates(
 def _solve(family: LoopFamily, conditions: list[tuple[ComplexArray, int, bool]]) -> FloatArray:
     """Return the gains for every place, shape (..., k); NaN where they are not determined."""
     rows, right = [], []
-    k = family.drive.shape[1]
+    k = family.spread.shape[1]
     for places, multiplicity, paired in conditions:
         ring = places[..., None] + 0.1 * (1.0 + np.abs(places))[..., None] * _CIRCLE
         value, slope = family.determinant(ring.ravel(), np.zeros(k))

@@ -10,6 +10,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.delay_system import DelaySystem
+from drillctrl.errors import InputError
 from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
@@ -43,8 +44,8 @@ class ActiveRoot:
 class LoopFamily:
     """All loops that one structure closes around one plant.
 
-    The collocated generator is affine in the gains, M(g) = M0 + Σ gj bj cjᵀ: a gain acts
-    from one output, now or delayed, on one input.
+    The collocated generator is affine in the gains, M(g) = M0 + Σ hj bj cjᵀ with h = S g:
+    an entry hj of (K1, K2) acts from one output, now or delayed, on one input.
 
     Attributes
     ----------
@@ -54,16 +55,18 @@ class LoopFamily:
         The structure.
     base : array, (q, q)
         M0, the generator with the fixed gains and the free ones at zero.
-    actuation : array, (q, k)
+    actuation : array, (q, c)
         Columns bj.
-    measurement : array, (k, q)
+    measurement : array, (c, q)
         Rows cjᵀ.
+    spread : array, (c, k)
+        S: how the entries of the gain matrices follow the gain vector.
     plain : DelaySystem
         The loop with the fixed gains only.
-    drive, seen : array, (n, k) and (k, n)
+    drive, seen : array, (n, c) and (c, n)
         The same columns and rows in the states of the plant.
-    late : bool array, (k,)
-        Which gains act on a delayed output.
+    late : bool array, (c,)
+        Which entries act on a delayed output.
     degree : int
         Of the collocation.
     """
@@ -73,6 +76,7 @@ class LoopFamily:
     base: FloatArray
     actuation: FloatArray
     measurement: FloatArray
+    spread: FloatArray
     plain: DelaySystem
     drive: FloatArray
     seen: FloatArray
@@ -85,7 +89,7 @@ class LoopFamily:
 
     def matrix(self, gains: FloatArray) -> FloatArray:
         """Return the collocated generator at a gain vector, shape (q, q)."""
-        return self.base + (self.actuation * gains) @ self.measurement
+        return self.base + (self.actuation * (self.spread @ gains)) @ self.measurement
 
     def abscissa(self, gains: FloatArray) -> tuple[float, FloatArray]:
         """Return the collocated spectral abscissa and its gradient.
@@ -100,8 +104,8 @@ class LoopFamily:
         value : float
             Largest real part of an eigenvalue of M(g).
         gradient : array, (k,)
-            Re (yᴴ bj)(cjᵀ x) / (yᴴ x) for the rightmost eigenvalue; one of the gradients
-            there are where several eigenvalues are rightmost.
+            Σ Sij Re (yᴴ bi)(ciᵀ x) / (yᴴ x) for the rightmost eigenvalue; one of the
+            gradients there are where several eigenvalues are rightmost.
         """
         real, imag, left, right, info = dgeev(self.matrix(gains), 1, 1)
         if info:
@@ -115,7 +119,7 @@ class LoopFamily:
             x = right[:, first] + 1j * right[:, first + 1]
         y = y.conj()
         scale = y @ x
-        slopes = (y @ self.actuation) * (self.measurement @ x)
+        slopes = ((y @ self.actuation) * (self.measurement @ x)) @ self.spread
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             gradient = np.real(slopes / scale)
         return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
@@ -124,7 +128,8 @@ class LoopFamily:
         """Return the collocated spectral abscissa at many gain vectors, (q, k) → (q,)."""
         if len(gains) == 0:
             return np.zeros(0)
-        stack = self.base + (self.actuation * gains[:, None, :]) @ self.measurement
+        entries = gains @ self.spread.T
+        stack = self.base + (self.actuation * entries[:, None, :]) @ self.measurement
         return np.asarray(np.linalg.eigvals(stack).real.max(axis=1))
 
     def active_gradients(
@@ -136,7 +141,7 @@ class LoopFamily:
         active = np.flatnonzero((values.real > top - width * (1 + abs(top))) & (values.imag >= 0))
         y, x = left[:, active].conj().T, right[:, active]
         scale = np.einsum("qn,nq->q", y, x)
-        slopes = (y @ self.actuation) * (self.measurement @ x).T
+        slopes = ((y @ self.actuation) * (self.measurement @ x).T) @ self.spread
         roots = tuple(ActiveRoot(float(s.imag), 1) for s in values[active])
         return np.real(slopes / scale[:, None]), roots
 
@@ -153,23 +158,24 @@ class LoopFamily:
         Returns
         -------
         array, (q,), and array, (q, k)
-            ∂ det Δ/∂gj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
+            ∂ det Δ/∂hj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
         """
-        seen = self._seen(s)
+        seen = self.seen_at(s)
         delta = self.characteristic_matrix(s, gains)
         value = np.linalg.det(delta)
         response = np.linalg.inv(delta) @ self.drive
         slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
-        return value, slopes
+        return value, slopes @ self.spread
 
-    def _seen(self, s: ComplexArray) -> ComplexArray:
-        """Rows cj(s), (q, k, n): a gain on a delayed output sees it through exp(−sτ)."""
+    def seen_at(self, s: ComplexArray) -> ComplexArray:
+        """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
         lag = np.exp(-s * self.plain.max_delay)
         return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
 
     def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
         """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
-        fed_back = np.einsum("nk,qkm->qnm", self.drive * gains, self._seen(s))
+        drive = self.drive * (self.spread @ gains)
+        fed_back = np.einsum("nk,qkm->qnm", drive, self.seen_at(s))
         return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
@@ -188,49 +194,54 @@ def loop_family(
     system : DelaySystem
         The plant, with at least one delay where the structure uses delayed outputs.
     feedback : FeedbackStructure
-        Names inputs, outputs and bounds.
+        Names inputs, outputs, bounds and ties.
     degree : int, optional
         Of the collocation; by default what the largest gains within the bounds need.
     """
     drive, measure = loop_channels(system, feedback)
-    half = feedback.K1_lower.size
-    free = np.flatnonzero(feedback.free)
-    fixed = np.where(feedback.free, 0.0, feedback.flat_lower)
-    shape = feedback.K1_lower.shape
+    half, shape = feedback.K1_lower.size, feedback.K1_lower.shape
+    spread = feedback.spread
+    entries = np.flatnonzero(spread.any(axis=1))
+    late = entries >= half
+    target, source = (entries % half) // shape[1], (entries % half) % shape[1]
+    fixed = feedback.fixed
     plain = close_loop(system, feedback, fixed[:half].reshape(shape), fixed[half:].reshape(shape))
     # Carry what the plant delays anyway and the measured outputs that are fed back late.
-    left, right = plain.factors[-1]
-    for source in sorted({(i % half) % shape[1] for i in free if i >= half}):
-        wider = np.vstack([right, measure[source]])
+    if late.any() and not system.delays:
+        raise InputError("structure", feedback.name, "without delayed outputs: no delay is known")
+    nothing = np.zeros((system.order, 0)), np.zeros((0, system.order))
+    left, right = plain.factors[-1] if plain.factors else nothing
+    for output in sorted(set(source[late].tolist())):
+        wider = np.vstack([right, measure[output]])
         if np.linalg.matrix_rank(wider) > right.shape[0]:
             right = wider
     left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
-    factors = (*plain.factors[:-1], (left, right))
+    factors = (*plain.factors[:-1], (left, right)) if plain.factors else ()
     if degree is None:
         # Three more than suffices to start an iteration on the characteristic equation.
         degree = degree_for(_largest(system, feedback), 0.0) + 3
     base = generator_matrix(plain, degree, factors)
     size, n, rank = base.shape[0], system.order, right.shape[0]
-    actuation = np.zeros((size, free.size))
-    measurement = np.zeros((free.size, size))
-    for column, index in enumerate(free):
-        source = (index % half) % measure.shape[0]
-        actuation[:n, column] = drive[:, (index % half) // measure.shape[0]]
-        if index < half:
-            measurement[column, :n] = measure[source]
+    actuation = np.zeros((size, entries.size))
+    actuation[:n] = drive[:, target]
+    measurement = np.zeros((entries.size, size))
+    for row, output in enumerate(source):
+        if late[row]:
+            weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
+            measurement[row, size - rank :] = weights
         else:
-            weights = np.linalg.lstsq(right.T, measure[source], rcond=None)[0]
-            measurement[column, size - rank :] = weights
+            measurement[row, :n] = measure[output]
     return LoopFamily(
         system,
         feedback,
         base,
         actuation,
         measurement,
+        spread[entries],
         plain,
         actuation[:n],
-        measure[(free % half) % shape[1]],
-        free >= half,
+        measure[source],
+        late,
         degree,
     )
 

@@ -249,8 +249,7 @@ def _gain_arrays(
     structure: FeedbackStructure, vectors: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return K1 and K2 for every gain vector, each (q, m, p)."""
-    flat = np.tile(structure.flat_lower, (len(vectors), 1))
-    flat[:, structure.free] = vectors
+    flat = structure.fixed + vectors @ structure.spread.T
     half = flat.shape[1] // 2
     shape = (len(vectors), *structure.K1_lower.shape)
     return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)

@@ -1,0 +1,47 @@
+"""The command line: one verb for each thing that the package does, each in its module."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from drillctrl.cli.analyze import analyze_command
+from drillctrl.cli.design import design_command
+from drillctrl.cli.simulate import simulate_command
+from drillctrl.errors import InputError
+
+BAD_INPUT = 2
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="drillctrl")
+def cli() -> None:
+    """Design bounded delayed feedback that keeps a rotary drill string from vibrating.
+
+    Where the rig drills is given by dimensionless groups (--omega0 --delta0 --psi) or by a
+    rig (--rig --speed --rop). With neither, it is ω0 = 10, δ0 = 1.75, ψ = 14.
+    """
+
+
+for _command in (design_command, analyze_command, simulate_command):
+    cli.add_command(_command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its status."""
+    try:
+        status = cli.main(arguments, prog_name="drillctrl", standalone_mode=False)
+    except InputError as error:
+        _fail(str(error))
+    except click.UsageError as error:
+        _fail(" ".join(error.format_message().split()))
+    except click.exceptions.Abort:
+        click.echo("drillctrl: interrupted", err=True)
+        sys.exit(130)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> None:
+    click.echo(f"drillctrl: {message}", err=True)
+    sys.exit(BAD_INPUT)

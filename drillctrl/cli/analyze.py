@@ -1,0 +1,51 @@
+"""`drillctrl analyze`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from drillctrl.cli.gains import read_gains
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+
+
+@click.command(name="analyze")
+@point_options
+@click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
+@click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
+@click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
+@click.option("--m", type=int, help="Intervals of the semi-discretisation reported.")
+@click.option("--order", type=int, default=2, show_default=True, help="Its order: 0, 1 or 2.")
+@click.option("--require-stable", is_flag=True, help="Exit with 3 if the loop is not stable.")
+@root_output_options
+def analyze_command(
+    structure: str | None,
+    k1: str | None,
+    k2: str | None,
+    m: int | None,
+    order: int,
+    require_stable: bool,
+    prove: bool,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **point: Any,
+) -> None:
+    """Say whether given gains, or none, make a point stable, and by how much.
+
+    \b
+    Examples:
+      drillctrl analyze --omega0 10 --delta0 1.75 --psi 14
+      drillctrl analyze --structure case1 --K1 -5.17 --K2 5.06 --m 3 --order 0
+    """
+    check_outputs(out, plot)
+    where = read_point(point)
+    from drillctrl.designing import analyze
+
+    gains = read_gains("K1", k1), read_gains("K2", k2)
+    result = analyze(where, structure, *gains, m=m, order=order)
+    deliver(result, prove, as_json, out, plot)
+    if require_stable and not result.stable:
+        raise click.exceptions.Exit(NOT_STABILISED)

@@ -1,0 +1,56 @@
+"""`drillctrl design`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+
+
+@click.command(name="design")
+@point_options
+@click.option(
+    "--structure",
+    default="case1",
+    show_default=True,
+    help="p: θ; case1: θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed.",
+)
+@click.option(
+    "--bound",
+    multiple=True,
+    metavar="GAIN=LOW:HIGH",
+    help="For K1, K2 or one gain such as K1_2; may be repeated.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
+@click.option("--require-stable", is_flag=True, help="Exit with 3 if nothing stabilises.")
+@root_output_options
+def design_command(
+    structure: str,
+    bound: tuple[str, ...],
+    seed: int,
+    require_stable: bool,
+    prove: bool,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **point: Any,
+) -> None:
+    """Find the gains within bounds that make vibrations decay fastest.
+
+    \b
+    Examples:
+      drillctrl design --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case2
+      drillctrl design --omega0 10 --delta0 12 --psi 14 --bound K1=-5:5 --json
+    """
+    check_outputs(out, plot)
+    where = read_point(point)
+    from drillctrl.designing import design
+
+    result = design(where, structure, bounds=read_bounds(bound), seed=seed)
+    deliver(result, prove, as_json, out, plot)
+    if require_stable and not result.stable:
+        raise click.exceptions.Exit(NOT_STABILISED)

@@ -1,0 +1,64 @@
+"""Where results go: standard output, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def json_text(fields: dict[str, Any]) -> str:
+    """Return the JSON object that a verb prints; NaN and Infinity are our fault."""
+    return json.dumps(fields, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def check_folder(parameter: str, path: str | None) -> None:
+    """Refuse a file in a folder that does not exist, before any work is done."""
+    if path is not None and not Path(path).absolute().parent.is_dir():
+        raise InputError(parameter, path, "in a folder that exists")
+
+
+def check_figure(plot: str | None) -> None:
+    """Refuse a bad name of a figure before any work is done."""
+    check_folder("--plot", plot)
+    if plot is not None:
+        from drillctrl.plotting import check_figure_path
+
+        check_figure_path(plot)
+
+
+def check_json(out: str | None) -> None:
+    """Refuse a bad name of a JSON file before any work is done."""
+    check_folder("--out", out)
+    if out is not None and Path(out).suffix.lower() != ".json":
+        raise InputError("--out", out, "a file that ends in .json")
+
+
+def writing(parameter: str, path: str, write: Callable[[], None]) -> None:
+    """Write a file, turning what the system refuses into a message about the option."""
+    try:
+        write()
+    except OSError as error:
+        raise InputError(
+            parameter, path, f"a file that can be written ({error.strerror})"
+        ) from None
+
+
+def write_json(out: str, fields: dict[str, Any]) -> None:
+    """Write what ``--json`` would print to a file."""
+    from drillctrl.files import write_text
+
+    writing("--out", out, lambda: write_text(out, json_text(fields) + "\n"))
+
+
+def write_figure(plot: str, figure: Figure) -> None:
+    """Write a figure by the file's ending."""
+    from drillctrl.plotting import save_figure
+
+    writing("--plot", plot, lambda: save_figure(figure, plot))

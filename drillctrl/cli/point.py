@@ -1,0 +1,111 @@
+"""Options that say where the rig drills, the same for every verb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.operating_point import OperatingPoint, RigPoint
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_DIMENSIONLESS = (
+    "omega0",
+    "delta0",
+    "psi",
+    "eta",
+    "xi",
+    "kappa",
+    "damping",
+    "blades",
+    "lam",
+    "beta",
+)
+_RIG = ("rig", "speed", "rop", "wob", "rock_strength")
+_POINT_C = {"omega0": 10.0, "delta0": 1.75, "psi": 14.0}
+
+
+def point_options(command: Command) -> Command:
+    """Add the options that say where the rig drills."""
+    options = [
+        click.option("--omega0", type=float, help="Rotary speed ω0 (default 10)."),
+        click.option("--delta0", type=float, help="Nominal depth of cut δ0 (default 1.75)."),
+        click.option("--psi", type=float, help="Cutting coefficient ψ (default 14)."),
+        click.option("--eta", type=float, help="Frequency ratio η (default 1.6)."),
+        click.option("--xi", type=float, help="Axial damping ratio ξ (default 0.02)."),
+        click.option("--kappa", type=float, help="Torsional damping ratio κ (default 0.02)."),
+        click.option("--damping", type=float, help="Sets ξ and κ together."),
+        click.option("--blades", type=float, help="Number of blades n (default 4)."),
+        click.option("--lam", type=float, help="Wear-flat force λ (default 0.7461 ψ)."),
+        click.option("--beta", type=float, help="Wear-flat torque β (default 0.2686)."),
+        click.option("--rig", help="Preset (table1) or TOML file, instead of the above."),
+        click.option("--speed", help="Rotary speed with its unit, such as '120 rpm'."),
+        click.option("--rop", help="Rate of penetration with its unit, such as '20 m/h'."),
+        click.option("--wob", help="Weight on bit instead of --rop, such as '20 kN'."),
+        click.option("--rock-strength", help="Instead of the rig's own, such as '60 MPa'."),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
+    """Return the point that the options name.
+
+    Raises
+    ------
+    InputError
+        If dimensionless and rig options are mixed, or one is missing or wrong.
+    """
+    groups = {k: options[k] for k in _DIMENSIONLESS if options.get(k) is not None}
+    rig = {k: options[k] for k in _RIG if options.get(k) is not None}
+    if groups and rig:
+        first = next(iter(groups))
+        raise InputError(
+            f"--{first}",
+            groups[first],
+            f"left out where --{next(iter(rig)).replace('_', '-')} gives the point in rig units",
+        )
+    return _rig_point(rig) if rig else _operating_point(groups)
+
+
+def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
+    from drillctrl.operating_point import OperatingPoint
+
+    values = {**_POINT_C, **groups}
+    damping = values.pop("damping", None)
+    if damping is not None:
+        for name in ("xi", "kappa"):
+            if name in groups:
+                raise InputError(f"--{name}", groups[name], "left out where --damping is given")
+            values[name] = damping
+    return OperatingPoint(**values)
+
+
+def _rig_point(given: dict[str, Any]) -> RigPoint:
+    from drillctrl import units
+    from drillctrl.operating_point import RigPoint
+    from drillctrl.rig import load_rig
+    from drillctrl.steady_state import rig_point_at_weight_on_bit
+
+    for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
+        if name not in given:
+            raise InputError(f"--{name}", "(missing)", f"given, {permitted}")
+    if ("rop" in given) == ("wob" in given):
+        shown = given.get("rop", "(missing)")
+        raise InputError("--rop", shown, "given, such as '20 m/h', or else --wob, one of the two")
+    rig = load_rig(given["rig"])
+    if "rock_strength" in given:
+        strength = units.to_si("--rock-strength", given["rock_strength"], units.STRESS)
+        rig = rig.with_rock_strength(strength)
+    speed = units.to_si("--speed", given["speed"], units.ROTARY_SPEED)
+    if "wob" in given:
+        return rig_point_at_weight_on_bit(
+            rig, speed, units.to_si("--wob", given["wob"], units.FORCE)
+        )
+    return RigPoint(rig, speed, units.to_si("--rop", given["rop"], units.SPEED))

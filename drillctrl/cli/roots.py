@@ -1,0 +1,60 @@
+"""What `design` and `analyze` share: the loop's roots, printed, written and drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
+
+if TYPE_CHECKING:
+    from drillctrl.designing import Design
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+NOT_STABILISED = 3
+
+
+def root_output_options(command: Command) -> Command:
+    """Add the options that say where results go."""
+    options = [
+        click.option("--prove", is_flag=True, help="Prove the root count in ball arithmetic."),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead."),
+        click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json."),
+        click.option("--plot", type=click.Path(), help="Draw the roots: FILE.png, .svg, .pdf."),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def check_outputs(out: str | None, plot: str | None) -> None:
+    """Refuse bad file names before any work is done."""
+    check_json(out)
+    check_figure(plot)
+
+
+def deliver(result: Design, prove: bool, as_json: bool, out: str | None, plot: str | None) -> None:
+    """Print the result, and write the files asked for."""
+    proof = result.prove() if prove else None
+    fields: dict[str, Any] = {}
+    if as_json or out is not None:
+        fields = result.to_dict()
+        if proof is not None:
+            fields["certificate"]["proof"] = dataclasses.asdict(proof)
+    if out is not None:
+        write_json(out, fields)
+    if plot is not None:
+        figure = result.plot().get_figure(root=True)
+        assert figure is not None
+        write_figure(plot, figure)
+    click.echo(json_text(fields) if as_json else result.summary())
+    if proof is not None and not as_json:
+        counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
+        click.echo(
+            f"Proved: {counted} right of {proof.line:.6g}, "
+            f"{proof.segments} segments in {proof.precision}-bit balls"
+        )
