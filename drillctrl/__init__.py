@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.designing import Design, analyze, design
     from drillctrl.errors import InputError
@@ -62,9 +63,11 @@ _HOME = {
     "Scenario": "simulation",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
+    "StabilityChart": "charts.stability_chart",
     "SteadyState": "steady_state",
     "analyze": "designing",
     "analyze_loop": "analysis",
+    "chart": "charts.stability_chart",
     "characteristic_roots": "spectrum.roots",
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
@@ -127,10 +130,12 @@ __all__ = [
     "Scenario",
     "SemiDiscretization",
     "Simulation",
+    "StabilityChart",
     "SteadyState",
     "analyze",
     "analyze_loop",
     "characteristic_roots",
+    "chart",
     "close_loop",
     "compare_spectra",
     "count_right_of",

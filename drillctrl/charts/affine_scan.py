@@ -69,7 +69,7 @@ class AffineLoops:
         return results[0], results[2], results[1], results[3]
 
 
-def _grid(loops: AffineLoops, line: float) -> FloatArray:
+def frequency_grid(loops: AffineLoops, line: float) -> FloatArray:
     """Return frequencies that resolve every line of a group, shape (G,)."""
     order = loops.a.coefficients.shape[1] - 1
     top = float(loops.reach.max()) / math.sin(math.pi / (2 * order)) * 1.001
@@ -113,7 +113,7 @@ def scan_affine(
     group = np.floor(2.0 * np.log2(np.maximum(loops.a.delays, 1e-6))).astype(int)
     for key in np.unique(group):
         members = np.flatnonzero(group == key)
-        grid = _grid(loops.take(members), line)
+        grid = frequency_grid(loops.take(members), line)
         for part in np.array_split(members, max(1, members.size * grid.size // _CHUNK)):
             scanned = _scan_group(loops.take(part), positions[part], low, high, line, grid)
             for index, scan in zip(part, scanned, strict=True):
@@ -155,21 +155,34 @@ def _scan_group(
         edges = np.concatenate([[low], at[part], [high]])
         places[i] = int(np.argmax(np.diff(edges)))
         probes[i] = 0.5 * (edges[places[i]] + edges[places[i] + 1])
-    known = _count(loops, a + probes[:, None] * b, probes, grid, line)
+    known = count_roots(loops, a + probes[:, None] * b, probes, grid, line)
     lines = []
     for i, part in enumerate(parts):
         steps = np.concatenate([[0], np.cumsum(jump[part])])
         counts = known[i] + steps - steps[places[i]]
         lines.append(
             ScanLine(
-                float(positions[i]), at[part], frequency[part], jump[part], counts, low, high, low
+                float(positions[i]),
+                at[part],
+                frequency[part],
+                jump[part],
+                counts,
+                low,
+                high,
+                low,
+                low,
             )
         )
     return lines
 
 
 def _zeros(
-    loops: AffineLoops, product: ComplexArray, grid: FloatArray, line: float, low: float, high: float
+    loops: AffineLoops,
+    product: ComplexArray,
+    grid: FloatArray,
+    line: float,
+    low: float,
+    high: float,
 ) -> tuple[np.ndarray, FloatArray]:
     """Find the sign changes of Im(a b*) in ω > 0; return (row, ω)."""
     g = product.imag
@@ -200,18 +213,18 @@ def _zeros(
     for _ in range(60):
         if not active.size:
             break
-        l, r, fl, fr = left[active], right[active], f_left[active], f_right[active]
+        a, b, fl, fr = left[active], right[active], f_left[active], f_right[active]
         with np.errstate(divide="ignore", invalid="ignore"):
-            new = (l * fr - r * fl) / (fr - fl)
-        new = np.where((new > l) & (new < r), new, 0.5 * (l + r))
+            new = (a * fr - b * fl) / (fr - fl)
+        new = np.where((new > a) & (new < b), new, 0.5 * (a + b))
         value = evaluate(new, active)
         goes_left = np.signbit(value) == np.signbit(fl)
         done = (np.abs(new - root[active]) < 1e-13 * (1.0 + new)) | (value == 0.0)
         root[active] = new
         was = side[active]
-        left[active] = np.where(goes_left, new, l)
+        left[active] = np.where(goes_left, new, a)
         f_left[active] = np.where(goes_left, value, np.where(was == 1.0, 0.5 * fl, fl))
-        right[active] = np.where(goes_left, r, new)
+        right[active] = np.where(goes_left, b, new)
         f_right[active] = np.where(goes_left, np.where(was == -1.0, 0.5 * fr, fr), value)
         side[active] = np.where(goes_left, -1.0, 1.0)
         done |= right[active] - left[active] < 1e-14 * (1.0 + new)
@@ -281,7 +294,7 @@ def _crossings(
     return np.asarray(np.nan_to_num(y, nan=np.inf)), jump
 
 
-def _count(
+def count_roots(
     loops: AffineLoops, f: ComplexArray, probes: FloatArray, grid: FloatArray, line: float
 ) -> np.ndarray:
     """Count the roots right of the line at y = probes by the argument principle."""

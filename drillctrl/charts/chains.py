@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,7 @@ def stable_curves(lines: tuple[ScanLine, ...], *, rows: bool) -> list[Curve]:
     for i in range(len(lines) - 1):
         for left, right in _groups(intervals[i], intervals[i + 1]):
             for line, members in ((i, left), (i + 1, right)):
-                for a, b in zip(members[:-1], members[1:], strict=True):
+                for a, b in itertools.pairwise(members):
                     join((line, a, 1), (line, b, 0))
             if left and right:
                 join((i, left[0], 0), (i + 1, right[0], 0))
@@ -103,9 +104,7 @@ def stable_curves(lines: tuple[ScanLine, ...], *, rows: bool) -> list[Curve]:
     return curves
 
 
-def _walk(
-    start: Node, links: dict[Node, list[Node]], seen: set[Node]
-) -> tuple[list[Node], bool]:
+def _walk(start: Node, links: dict[Node, list[Node]], seen: set[Node]) -> tuple[list[Node], bool]:
     path = [start]
     seen.add(start)
     while True:

@@ -225,13 +225,16 @@ def scan_rotary_speed(
         part = slice(bounds[i], bounds[i + 1])
         w, phi, sign = omega[part], phase[part], direction[part]
         limit = turn / low if low > 0.0 else math.inf
-        longest, decided = _far_enough(w, phi, sign, int(base[i]), limit)
-        if longest < limit:
-            decided = low if decided else turn / longest
-        else:
-            decided = low
-        lobes = [np.arange(max(0, math.floor((a * longest - f) / (2 * np.pi)) + 1))
-                 for a, f in zip(w, phi, strict=True)] if w.size else []
+        longest, proved = _far_enough(w, phi, sign, int(base[i]), limit)
+        listed = turn / longest if longest < limit else low
+        lobes = (
+            [
+                np.arange(max(0, math.floor((a * longest - f) / (2 * np.pi)) + 1))
+                for a, f in zip(w, phi, strict=True)
+            ]
+            if w.size
+            else []
+        )
         if lobes:
             which = np.repeat(np.arange(w.size), [lobe.size for lobe in lobes])
             delays = (phi[which] + 2 * np.pi * np.concatenate(lobes)) / w[which]
@@ -257,7 +260,8 @@ def scan_rotary_speed(
                 counts[first : last + 1],
                 low,
                 high,
-                decided,
+                low if proved else listed,
+                listed,
             )
         )
     return lines

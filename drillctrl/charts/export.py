@@ -12,7 +12,6 @@ from drillctrl.charts.chains import Curve
 from drillctrl.charts.plane import Plane
 
 if TYPE_CHECKING:
-    from drillctrl.charts.optimised import OptimisedChart
     from drillctrl.charts.stability_chart import StabilityChart
 
 
@@ -57,7 +56,7 @@ def chart_fields(chart: StabilityChart) -> dict[str, Any]:
 
 def area_text(area: float, error: float, plane: Plane) -> str:
     """Return an area with its error and its share of the chart."""
-    digits = max(0, min(6, 1 - math.floor(math.log10(max(error, 1e-12)))))
+    digits = max(0, min(6, -math.floor(math.log10(max(error, 1e-12)))))
     share = area / (plane.x.span * plane.y.span)
     return f"{area:.{digits}f} ± {error:.1g} ({share:.1%} of the chart)"
 
@@ -77,27 +76,11 @@ def chart_summary(chart: StabilityChart) -> str:
     frequencies = [curve.omega for curve in chart.curves]
     if frequencies:
         omega = np.concatenate(frequencies)
-        lines.append(f"  boundary  {len(chart.curves)} curve(s), frequencies {omega.min():.3g} "
-                     f"to {omega.max():.3g}")
+        lines.append(
+            f"  boundary  {len(chart.curves)} curve(s), frequencies {omega.min():.3g} "
+            f"to {omega.max():.3g}"
+        )
     checked = [region for region in chart.regions if region.confirmed is not None]
     agree = sum(bool(region.confirmed) for region in checked)
     lines.append(f"  checked   the argument principle agrees in {agree} of {len(checked)} regions")
     return "\n".join(lines)
-
-
-def optimised_fields(chart: OptimisedChart) -> dict[str, Any]:
-    """Return the JSON fields of ``chart --optimise``."""
-    return {
-        "schema": "drillctrl/chart/1",
-        **plane_fields(chart.plane),
-        "optimised": True,
-        "level": 0.0,
-        "stable_area": chart.stable_area,
-        "stable_area_error": chart.area_error,
-        "open_loop_area": chart.open_loop_area,
-        "area_ratio": chart.area_ratio,
-        "boundaries": [curve.tolist() for curve in chart.curves],
-        "method": chart.method,
-        "evaluations": chart.evaluations,
-        "elapsed_seconds": chart.elapsed_seconds,
-    }

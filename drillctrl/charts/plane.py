@@ -76,10 +76,12 @@ class Plane:
         assert self.structure is not None
         flat = np.concatenate([self.K1.ravel(), self.K2.ravel()])
         table = np.tile(flat, (count, 1))
-        places = np.flatnonzero(self.structure.free)
-        for name, place in zip(self.structure.gain_names, places, strict=True):
+        columns = self.structure.spread.T
+        for name, column in zip(self.structure.gain_names, columns, strict=True):
             if name in values:
-                table[:, place] = values[name]
+                # A gain takes along those that are tied to it.
+                table[:, column != 0.0] = 0.0
+                table += np.outer(values[name], column)
         half, shape = flat.size // 2, self.K1.shape
         return table[:, :half].reshape(-1, *shape), table[:, half:].reshape(-1, *shape)
 
@@ -88,7 +90,7 @@ class Plane:
         count = x.size
         values = {self.x.name: x, self.y.name: y}
         table = self._parameters(values, count)
-        a0, a1, drive, tau = (
+        a0, a1, _drive, tau = (
             value.full() for value in linearisation(dimensionless_plant())(table.T)
         )
         n = a0.shape[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,15 +11,16 @@ from drillctrl.charts.chains import Curve, stable_strips
 from drillctrl.plotting import BLUE, GREEN, GREY, ORANGE, new_axes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from matplotlib.axes import Axes
 
     from drillctrl.charts.plane import Plane
     from drillctrl.charts.stability_chart import StabilityChart
+    from drillctrl.spectrum.characteristic import FloatArray
 
-# A boundary on which the root turns at least this fast is called axial: the torsional
-# frequency is 1 and the axial one η, in units of the torsional one.
+    Scale = Callable[[Any], Any]
+
 STYLES = ("-", "--", "-.", ":")
 
 
@@ -35,21 +36,20 @@ def label_axes(ax: Axes, plane: Plane) -> None:
     rpm = 30.0 / np.pi / rig.time_scale
     # v0 = δ0 ω0: at one speed, δ0 is proportional to the rate of penetration.
     metres = plane.rig_point.rotary_speed * rig.axial_scale * 3600.0
-    for name, axis, factor, text in (
-        ("omega0", "x", rpm, "rotary speed, rpm"),
-        ("delta0", "y", metres, f"rate of penetration at {_speed_text(plane)}, m/h"),
-    ):
-        for side, given in (("x", plane.x), ("y", plane.y)):
-            if given.name == name:
-                twin = (ax.secondary_xaxis if side == "x" else ax.secondary_yaxis)(
-                    "top" if side == "x" else "right",
-                    functions=(_scaled(factor), _scaled(1.0 / factor)),
-                )
-                (twin.set_xlabel if side == "x" else twin.set_ylabel)(text)
+    twins = {
+        "omega0": (rpm, "rotary speed, rpm"),
+        "delta0": (metres, f"rate of penetration at {_speed_text(plane)}, m/h"),
+    }
+    if plane.x.name in twins:
+        factor, text = twins[plane.x.name]
+        ax.secondary_xaxis("top", functions=_scaling(factor)).set_xlabel(text)
+    if plane.y.name in twins:
+        factor, text = twins[plane.y.name]
+        ax.secondary_yaxis("right", functions=_scaling(factor)).set_ylabel(text)
 
 
-def _scaled(factor: float):  # type: ignore[no-untyped-def]
-    return lambda value: np.asarray(value) * factor
+def _scaling(factor: float) -> tuple[Scale, Scale]:
+    return (lambda value: np.asarray(value) * factor, lambda value: np.asarray(value) / factor)
 
 
 def _speed_text(plane: Plane) -> str:
@@ -91,23 +91,30 @@ def plane_title(plane: Plane) -> str:
 
 
 def draw_strips(
-    ax: Axes, polygons: list[np.ndarray], colour: str, label: str, alpha: float = 0.25
+    ax: Axes, polygons: list[FloatArray], colour: str, label: str, alpha: float = 0.25
 ) -> None:
     """Shade a set of polygons as one."""
-    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
 
-    ax.add_collection(
-        PolyCollection(
-            polygons,
-            facecolors=colour,
-            edgecolors="none",
-            alpha=alpha,
-            label=label,
-            zorder=1,
-            antialiaseds=False,
-        ),
-        autolim=False,
+    if not polygons:
+        return
+    # One compound path, so that neighbours that share an edge are not painted twice there.
+    path = Path.make_compound_path(
+        *(Path(_anticlockwise(p), closed=True) for p in closed(polygons))
     )
+    ax.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", alpha=alpha, label=label))
+
+
+def closed(polygons: list[FloatArray]) -> list[FloatArray]:
+    """Return polygons with their first corner repeated at the end."""
+    return [np.vstack([polygon, polygon[:1]]) for polygon in polygons]
+
+
+def _anticlockwise(polygon: FloatArray) -> FloatArray:
+    x, y = polygon.T
+    twice = float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
+    return polygon if twice >= 0.0 else polygon[::-1]
 
 
 def draw_curves(
@@ -148,13 +155,15 @@ def plot_chart(chart: StabilityChart, ax: Axes | None = None) -> Axes:
         )
         drawn.set_array(np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
-        assert ax.figure is not None
-        bar = ax.get_figure(root=True).colorbar(drawn, ax=ax, pad=0.12 if chart.plane.rig_point else 0.02)  # type: ignore[union-attr]
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if chart.plane.rig_point else 0.02)
         bar.set_label("frequency of the crossing root, |Im s|")
     _label_regions(ax, chart)
     label_axes(ax, chart.plane)
     ax.set_title(plane_title(chart.plane), fontsize="medium")
-    ax.legend(loc="best", fontsize="small")
+    counted = "unstable roots" if chart.level == 0.0 else "roots farther right"
+    ax.legend(loc="best", fontsize="small", title=f"numbers: {counted}", title_fontsize="small")
     return ax
 
 
@@ -164,9 +173,7 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
     for region in chart.regions:
         if region.unstable_roots and region.area > 0.02 * whole:
             ax.annotate(
-                f"{region.unstable_roots} unstable roots"
-                if chart.level == 0.0
-                else f"{region.unstable_roots} roots",
+                str(region.unstable_roots),
                 (region.x, region.y),
                 ha="center",
                 va="center",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
@@ -37,18 +38,19 @@ class Quasipolynomials:
         used = np.abs(self.coefficients).max(axis=(0, 1)) > 0.0
         return int(np.flatnonzero(used).max())
 
-    def polynomials(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def polynomials(self, at: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Return P[k](s) = Σ c[j, k] s^j and their derivatives.
 
         Parameters
         ----------
-        s : array, (N, ...)
+        at : array_like, (N, ...)
             One row for each loop.
 
         Returns
         -------
         values, slopes : array, (r + 1, N, ...)
         """
+        s = np.asarray(at, dtype=complex)
         shape = (-1, *[1] * (s.ndim - 1))
         order, degree = self.coefficients.shape[1] - 1, self.coefficients.shape[2]
         values = np.empty((degree, *s.shape), dtype=complex)

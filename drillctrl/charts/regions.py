@@ -68,14 +68,13 @@ def label_regions(
     segments: list[tuple[int, float, float, float, float]] = []
     before: list[tuple[float, float, int, int]] = []
     positions = np.array([line.position for line in chosen])
-    edges = np.concatenate(
-        [positions[:1], 0.5 * (positions[1:] + positions[:-1]), positions[-1:]]
-    )
+    edges = np.concatenate([positions[:1], 0.5 * (positions[1:] + positions[:-1]), positions[-1:]])
     for width, line in zip(np.diff(edges), chosen, strict=True):
-        ends = np.concatenate([[line.low], line.at, [line.high]])
+        skip = int(np.searchsorted(line.at, line.listed_from))
+        ends = np.concatenate([[line.listed_from], line.at[skip:], [line.high]])
         now = []
         k = 0
-        for start, stop, count in zip(ends[:-1], ends[1:], line.counts, strict=True):
+        for start, stop, count in zip(ends[:-1], ends[1:], line.counts[skip:], strict=True):
             index = len(parent)
             parent.append(index)
             segments.append((int(count), line.position, float(start), float(stop), float(width)))
@@ -92,13 +91,20 @@ def label_regions(
     for i, segment in enumerate(segments):
         members.setdefault(find(i), []).append(segment)
     whole = plane.x.span * plane.y.span
+    low, high = float(positions[0]), float(positions[-1])
+
+    def room(segment: tuple[int, float, float, float, float]) -> float:
+        """How far the middle of a segment is from its ends and from the edges of the chart."""
+        _, position, start, stop, _ = segment
+        across = min(position - low, high - position) / (high - low)
+        return min(across, 0.5 * (stop - start) / (lines[0].high - lines[0].low))
+
     found = []
     for group in members.values():
         area = sum((stop - start) * width for _, _, start, stop, width in group)
         if area < _SMALLEST_SHARE * whole:
             continue
-        inner = [s for s in group if lines[0].position < s[1] < lines[-1].position] or group
-        count, position, start, stop, _ = max(inner, key=lambda s: s[3] - s[2])
+        count, position, start, stop, _ = max(group, key=room)
         found.append((area, count, position, 0.5 * (start + stop)))
     found.sort(reverse=True)
     regions = []

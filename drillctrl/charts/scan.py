@@ -36,7 +36,10 @@ class ScanLine:
     low, high : float
         Ends of the line.
     decided_from : float
-        Below this value nothing was computed and nothing is proved (``low`` normally).
+        Below this value nothing is proved (``low`` normally).
+    listed_from : float
+        Below this value crossings are not listed and counts are meaningless, other than that
+        the segment is unstable where it is decided (``low`` normally).
     """
 
     position: float
@@ -47,6 +50,7 @@ class ScanLine:
     low: float
     high: float
     decided_from: float
+    listed_from: float
 
     def stable_intervals(self) -> list[tuple[float, float, float, float]]:
         """Return (start, end, ω at start, ω at end) of each stable stretch.

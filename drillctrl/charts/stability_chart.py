@@ -13,6 +13,7 @@ import numpy.typing as npt
 from drillctrl.charts.affine_scan import affine_loops, scan_affine
 from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chains import Curve, stable_curves
+from drillctrl.charts.counting_scan import scan_counting
 from drillctrl.charts.delay_scan import scan_rotary_speed
 from drillctrl.charts.plane import Plane, check_plane
 from drillctrl.charts.quasipolynomial import from_matrices
@@ -23,6 +24,7 @@ from drillctrl.errors import InputError, checked_number
 from drillctrl.feedback import FeedbackStructure, gain_matrices, preset_structure
 from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.count import count_right_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +45,8 @@ class StabilityChart:
         σ: a place counts as stable where no root lies right of Re s = σ.
     method : str
         ``"delay"``: crossings in closed form along ω0; ``"affine"``: along a parameter in
-        which the characteristic equation is affine.
+        which the characteristic equation is affine; ``"counting"``: roots counted at sample
+        places, crossings by bisection.
     curves : tuple of Curve
         The boundary of the stable set, with the frequency of the crossing root.
     regions : tuple of Region
@@ -69,12 +72,12 @@ class StabilityChart:
     rows: bool
     elapsed_seconds: float
 
-    def unstable_roots(self, x: float, y: float) -> int:
-        """Return the number of roots right of the line on the scan line nearest to a place."""
-        position, along = (y, x) if self.rows else (x, y)
-        places = np.array([line.position for line in self.lines])
-        line = self.lines[int(np.argmin(np.abs(places - position)))]
-        return int(line.counts[int(np.searchsorted(line.at, along))])
+    def unstable_roots(self, x: float, y: float) -> int | None:
+        """Count the roots right of the line at one place, by the argument principle.
+
+        None where a root lies too near the line to tell.
+        """
+        return count_right_of(self.plane.system(x, y), self.level).count
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -164,22 +167,16 @@ def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
 
 
 def choose_scanner(plane: Plane, level: float) -> tuple[str, bool, Scanner]:
-    """Return the method, whether its lines are rows, and the scanner.
-
-    Raises
-    ------
-    InputError
-        If neither parameter permits a closed form.
-    """
+    """Return the method, whether its lines are rows, and the scanner."""
     x, y = plane.x, plane.y
     if level == 0.0:
-        for scanned, held, rows in ((x, y, True), (y, x, False)):
+        for scanned, rows in ((x, True), (y, False)):
             if scanned.name == "omega0":
                 return "delay", rows, _delay_scanner(plane, scanned, rows=rows)
     for scanned, held, rows in ((y, x, False), (x, y, True)):
         if _is_affine(plane, held, scanned, rows=rows):
             return "affine", rows, _affine_scanner(plane, scanned, level, rows=rows)
-    raise InputError("y", y.name, "a parameter (or x one) that enters linearly, or else omega0")
+    return "counting", False, _counting_scanner(plane, level)
 
 
 def _delay_scanner(plane: Plane, scanned: Axis, *, rows: bool) -> Scanner:
@@ -201,6 +198,15 @@ def _affine_scanner(plane: Plane, scanned: Axis, level: float, *, rows: bool) ->
         ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
         loops = affine_loops(ends[0], ends[1], low, high, level)
         return scan_affine(loops, positions, low, high, level)
+
+    return scan
+
+
+def _counting_scanner(plane: Plane, level: float) -> Scanner:
+    low, high = first_position(plane.y), plane.y.high
+
+    def scan(positions: FloatArray) -> list[ScanLine]:
+        return scan_counting(plane.matrices, positions, low, high, level)
 
     return scan
 

@@ -7,6 +7,7 @@ Simpson's rule agrees with the trapezoidal rule, and to a hair's breadth at each
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +95,7 @@ def sweep(
     positions = np.unique(np.concatenate([positions, [low + 1e-6 * span, high - 1e-6 * span]]))
     lines = {float(t): line for t, line in zip(positions, scanner(positions), strict=True)}
     order = sorted(lines)
-    panels = list(zip(order[:-1], order[1:], strict=True))
+    panels = list(itertools.pairwise(order))
     done: list[tuple[float, float]] = []
     wide = span / (4 * (first - 1))
     for _ in range(_ROUNDS):
@@ -126,9 +127,10 @@ def sweep(
         done.append((0.5 * (b - a) * sum(lengths), (b - a) * max(lengths)))
     kept = tuple(lines[t] for t in sorted(lines))
     undecided = sum(
-        0.5 * (two.position - one.position)
+        0.5
+        * (two.position - one.position)
         * (one.decided_from - one.low + two.decided_from - two.low)
-        for one, two in zip(kept[:-1], kept[1:], strict=True)
+        for one, two in itertools.pairwise(kept)
     )
     return Sweep(
         kept,
@@ -143,9 +145,7 @@ def _rough_area(lines: dict[float, ScanLine]) -> float:
     return float(np.trapezoid(lengths, order))
 
 
-def _panel_area(
-    one: ScanLine, mid: ScanLine, two: ScanLine, width: float
-) -> tuple[float, float]:
+def _panel_area(one: ScanLine, mid: ScanLine, two: ScanLine, width: float) -> tuple[float, float]:
     """Return Simpson's area of a panel and an estimate of its error."""
     a, m, b = _length(one), _length(mid), _length(two)
     simpson = width * (a + 4.0 * m + b) / 6.0
