@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.design_result import Design
     from drillctrl.designing import analyze, design
@@ -74,11 +75,13 @@ _HOME = {
     "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
+    "StabilityChart": "charts.stability_chart",
     "SteadyState": "steady_state",
     "Tie": "feedback",
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
+    "chart": "charts.stability_chart",
     "characteristic_roots": "spectrum.roots",
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
@@ -145,12 +148,14 @@ __all__ = [
     "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
+    "StabilityChart",
     "SteadyState",
     "Tie",
     "WorstCase",
     "analyze",
     "analyze_loop",
     "characteristic_roots",
+    "chart",
     "close_loop",
     "compare_spectra",
     "count_right_of",
