@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     )
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
-    from drillctrl.robustness import (
-        delay_margin,
-        parameter_margin,
+    from drillctrl.robustness.margins import delay_margin, parameter_margin, point_margins
+    from drillctrl.robustness.radius import (
         pseudospectral_abscissa,
         real_stability_radius,
         stability_radius,
@@ -86,7 +85,7 @@ _HOME = {
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
     "count_right_of": "spectrum.count",
-    "delay_margin": "robustness",
+    "delay_margin": "robustness.margins",
     "design": "designing",
     "dimensional_plant": "plant",
     "dimensionless_plant": "plant",
@@ -96,12 +95,13 @@ _HOME = {
     "load_rig": "rig",
     "loop_frd": "transfer",
     "loop_transfer": "transfer",
-    "parameter_margin": "robustness",
+    "parameter_margin": "robustness.margins",
     "plant_system": "delay_system",
+    "point_margins": "robustness.margins",
     "preset_structure": "feedback",
     "prove_count": "spectrum.proof",
-    "pseudospectral_abscissa": "robustness",
-    "real_stability_radius": "robustness",
+    "pseudospectral_abscissa": "robustness.radius",
+    "real_stability_radius": "robustness.radius",
     "rig_point_at_weight_on_bit": "steady_state",
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
@@ -109,7 +109,7 @@ _HOME = {
     "simulate": "simulation",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
-    "stability_radius": "robustness",
+    "stability_radius": "robustness.radius",
     "steady_state": "steady_state",
     "table1": "rig",
     "to_frd": "transfer",
@@ -171,6 +171,7 @@ __all__ = [
     "loop_transfer",
     "parameter_margin",
     "plant_system",
+    "point_margins",
     "preset_structure",
     "prove_count",
     "pseudospectral_abscissa",

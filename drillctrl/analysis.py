@@ -12,7 +12,7 @@ from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.feedback import FeedbackStructure, close_loop
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.plant import Plant
-from drillctrl.robustness import with_delay_factor
+from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.roots import Root, dominant_roots, spectral_abscissa

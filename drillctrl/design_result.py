@@ -28,7 +28,8 @@ from drillctrl.optimisation.certificate import OptimalityCertificate
 from drillctrl.optimisation.family import loop_family
 from drillctrl.optimisation.objectives import NO_REQUIREMENTS, Exact, Objective, Requirements
 from drillctrl.plant import Plant
-from drillctrl.robustness import DelayMargin, StabilityRadius, delay_margin, stability_radius
+from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin, point_margins
+from drillctrl.robustness.radius import StabilityRadius, stability_radius
 from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:
@@ -153,6 +154,13 @@ class Design:
         """How wrong the delays may be; None for a loop that is unstable or without delay."""
         loop = self.system()
         return delay_margin(loop) if self.stable and loop.delays else None
+
+    @functools.cached_property
+    def point_margins(self) -> dict[str, ParameterMargin] | None:
+        """How wrong ψ, δ0 and ω0 may each be; None for an unstable loop or a user's plant."""
+        if not self.stable or self.point is None or self.structure is None:
+            return None
+        return point_margins(self.point, self.structure, self.K1, self.K2, self.physics)
 
     def _perturbed(self) -> dict[str, DelaySystem]:
         return perturbed_plants(self.plant, self.point, self.physics)

@@ -97,6 +97,13 @@ def _distance_fields(design: Design) -> dict[str, Any]:
         fields["delay_margin"] = {
             "shorter": margin.shorter,
             "longer": finite_or_none(margin.longer),
+            "limit": finite_or_none(margin.limit),
+        }
+    fields["point_margins"] = None
+    if design.point_margins is not None:
+        fields["point_margins"] = {
+            name: {"lower": errors.lower, "upper": errors.upper, "limit": errors.limit}
+            for name, errors in design.point_margins.items()
         }
     return fields
 
