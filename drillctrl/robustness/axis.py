@@ -138,7 +138,8 @@ class _Line:
         curved = np.where(values > 0.0, curved, np.inf)
         one, other = h * _size(by_omega), k * _size(by_factor)
         part = one / np.maximum(one + other, 1e-300)
-        return values, one + part * curved, other + (1.0 - part) * curved
+        first, second = one + part * curved, other + (1.0 - part) * curved
+        return np.asarray(values), np.asarray(first), np.asarray(second)
 
 
 def _search(
