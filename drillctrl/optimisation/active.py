@@ -17,8 +17,6 @@ import scipy.optimize
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
-_CIRCLES = {n: np.exp(2j * np.pi * np.arange(n) / n) for n in (12, 16)}
-
 
 @dataclass(frozen=True, eq=False)
 class ActiveDesign:
@@ -122,9 +120,8 @@ def sharpen(
 
     Notes
     -----
-    det Δ is sampled on a circle about each root; its Taylor coefficients there, and their
-    derivatives by the gains, follow from one stack of inverses, so the conditions and their
-    Jacobian are exact.
+    The conditions are the Taylor coefficients of det Δ about each root; their derivatives by
+    the gains and by the place are exact.
     """
     k = gains.size
     count = [0]
@@ -191,15 +188,12 @@ def _taylor(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return the scaled Taylor coefficients of det Δ at s and their gain derivatives.
 
-    Coefficient l is multiplied by the l-th power of the radius of the circle. Shapes
+    Coefficient l is multiplied by the l-th power of a length of the size of s. Shapes
     (terms,) and (terms, k).
     """
-    # Aliasing falls with the power points − terms of the ratio of circle to scale.
-    points = 12 if terms <= 3 else 16
-    circle = _CIRCLES[points]
-    determinant, slopes = family.determinant(s + _radius(s) * circle, gains)
-    wave = circle[:, None] ** -np.arange(terms) / points
-    return determinant @ wave, wave.T @ slopes
+    values, slopes = family.taylor(np.array([s]), gains, terms)
+    scale = _radius(s) ** np.arange(terms)
+    return values[0] * scale, slopes[0] * scale[:, None]
 
 
 def _scales(
