@@ -69,8 +69,8 @@ class Design:
         What is fed back; None for an open loop.
     K1, K2 : array, (m, p)
         Gains on Y(t) and on Y(t − τ0).
-    loop, open_loop : LoopAnalysis
-        With and without the feedback.
+    loop : LoopAnalysis
+        With the feedback.
     objective : Objective or None
         What the gains minimise; None for given gains.
     objective_value : float or None
@@ -95,7 +95,6 @@ class Design:
     K1: FloatArray
     K2: FloatArray
     loop: LoopAnalysis
-    open_loop: LoopAnalysis
     objective: Objective | None = None
     objective_value: float | None = None
     requirements: Requirements = NO_REQUIREMENTS
@@ -118,6 +117,11 @@ class Design:
     def minimises_alpha(self) -> bool:
         """Whether the gains minimise the spectral abscissa, and nothing was required beside."""
         return isinstance(self.objective, Exact) and not self.requirements
+
+    @functools.cached_property
+    def open_loop(self) -> LoopAnalysis:
+        """Without the feedback."""
+        return self.loop if self.structure is None else analyze_roots(self.plant)
 
     @functools.cached_property
     def fragility(self) -> Fragility | None:
@@ -252,6 +256,5 @@ def assess(
     """Analyse the loop that the gains close, beside the open loop."""
     plant = subject.plant
     loop = analyze_loop(closed_loop(plant, feedback, K1, K2), m, order)
-    open_loop = loop if feedback is None else analyze_roots(plant)
     where = subject.point, subject.rig_point, subject.physics
-    return Design(plant, *where, feedback, K1, K2, loop, open_loop)
+    return Design(plant, *where, feedback, K1, K2, loop)

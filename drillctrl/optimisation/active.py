@@ -19,9 +19,11 @@ from drillctrl.optimisation.conditions import Conditions, conditions
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
-_NEWTON_STEPS = 25
-_SEQUENTIAL_STEPS = 30
+_NEWTON_STEPS = 15
+_SEQUENTIAL_STEPS = 15
 _CONVERGED = 1e-10
+# Relative descent of t from which a configuration is given up.
+_DEEPEST = 0.5
 # Relative distance at which a gain counts as lying on its bound.
 _ON_BOUND = 1e-6
 # Relative change in one step beyond which Newton's step is shortened.
@@ -153,6 +155,7 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
     """
     k, u = task.gains, task.start.copy()
     lower, upper = task.family.feedback.lower, task.family.feedback.upper
+    lowest = u[k] - _DEEPEST * (1.0 + abs(u[k]))
     near = _ON_BOUND * (upper - lower)
     held = np.zeros(u.size, dtype=bool)
     for bound in (lower, upper):
@@ -174,11 +177,11 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
         along, basis = q[:, :rows], q[:, rows:]
         multipliers = scipy.linalg.solve_triangular(r, -along.T @ gradient[free])
         change = along @ scipy.linalg.solve_triangular(r, -value, trans=1)
-        lowest = 0.0
+        least = 0.0
         if basis.shape[1]:
             hessian = task.curvature(u, multipliers)[np.ix_(free, free)]
             curvatures, vectors = np.linalg.eigh(basis.T @ hessian @ basis)
-            lowest = float(curvatures[0])
+            least = float(curvatures[0])
             slope = vectors.T @ basis.T @ (gradient[free] + hessian @ change)
             floor = 1e-8 * max(1.0, float(np.abs(curvatures).max()))
             change = change - basis @ vectors @ (slope / np.maximum(np.abs(curvatures), floor))
@@ -195,7 +198,7 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
         stopped = ratios <= min(first, 1.0)
         u = u + min(first, 1.0) * step
         u[:k] = np.where(stopped, np.where(step[:k] > 0.0, upper, lower), u[:k])
-        if (u[k + 1 :] <= 0.0).any():
+        if (u[k + 1 :] <= 0.0).any() or u[k] < lowest:
             return None, used
         if stopped.any():
             held[:k] |= stopped
@@ -204,7 +207,7 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
             pull = (multipliers @ jacobian)[:k] * np.where(u[:k] <= lower, 1.0, -1.0)
             released = held[:k] & (pull < -_CONVERGED)
             if not released.any():
-                return (u if lowest > -_CONVERGED else None), used
+                return (u if least > -_CONVERGED else None), used
             held[:k] &= ~released
     return None, used
 
@@ -227,7 +230,9 @@ def _sequential(task: Conditions) -> tuple[FloatArray, int]:
     gradient = np.zeros(task.start.size)
     gradient[k] = 1.0
     paired = task.start.size - k - 1
-    bounds = [*zip(feedback.lower, feedback.upper, strict=True), (None, None)]
+    # Far below, other roots than those of the configuration are rightmost.
+    lowest = task.start[k] - _DEEPEST * (1.0 + abs(task.start[k]))
+    bounds = [*zip(feedback.lower, feedback.upper, strict=True), (lowest, None)]
     result = scipy.optimize.minimize(
         lambda u: float(u[k]),
         task.start,

@@ -25,7 +25,7 @@ class Effort:
     Attributes
     ----------
     looked : int
-        Points of the box at which the abscissa is evaluated; a power of two.
+        Points of the box at which the abscissa is evaluated.
     begun : int
         Descents begun at the best of them.
     steps : int
@@ -100,7 +100,7 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
     family : LoopFamily
         Loops to choose from.
     seed : int
-        Scrambles the Sobol points; the same seed gives the same result.
+        Scrambles the Halton points; the same seed gives the same result.
     effort : Effort, optional
         By default according to the number of gains.
     """
@@ -140,9 +140,9 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
 
 
 def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
-    """Return the best points of two Sobol sets, over the box and over its middle part."""
+    """Return the best points of two Halton sets, over the box and over its middle part."""
     lower, upper = family.feedback.lower, family.feedback.upper
-    cube = qmc.Sobol(lower.size, scramble=True, rng=seed).random(effort.looked)
+    cube = qmc.Halton(lower.size, scramble=True, rng=seed).random(effort.looked)
     wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
     # The box is generous: many useful gains are small against it.
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
