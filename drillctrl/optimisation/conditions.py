@@ -6,6 +6,7 @@ together with its first k − 1 derivatives. The unknowns are u = (gains, t, fre
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ class Conditions:
         omega[self._paired] = u[self.gains + 1 :]
         return np.asarray(u[self.gains] + 1j * omega)
 
-    @property
+    @functools.cached_property
     def _paired(self) -> list[int]:
         return [i for i, root in enumerate(self.roots) if root.omega != 0.0]
 
