@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +93,12 @@ class Search:
     evaluations: int
 
 
-def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = None) -> Search:
+def global_search(
+    family: LoopFamily,
+    seed: int = 0,
+    effort: Effort | None = None,
+    known: Sequence[FloatArray] = (),
+) -> Search:
     """Minimise the collocated abscissa over the box of the family's structure.
 
     Parameters
@@ -103,6 +109,8 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
         Scrambles the Sobol points; the same seed gives the same result.
     effort : Effort, optional
         By default according to the number of gains.
+    known : sequence of array, (k,)
+        Gains that are good nearby; descents begin there too.
     """
     lower, upper = family.feedback.lower, family.feedback.upper
     count = lower.size
@@ -111,7 +119,7 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
         only = Basin(lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
-    starts = starting_points(family, seed, effort)
+    starts = [*(np.clip(g, lower, upper) for g in known), *starting_points(family, seed, effort)]
     evaluations = 2 * effort.looked
     ends = []
     for start in starts:
@@ -124,8 +132,8 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
     width = upper - lower
     for i, basin in enumerate(ends):
         # Another descent into the same corner teaches nothing.
-        known = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
-        if len(sharp) == effort.sharpened or known:
+        seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
+        if len(sharp) == effort.sharpened or seen:
             rest.append(basin)
             continue
         better, used = improve(family, basin, effort.rounds)
