@@ -28,7 +28,7 @@ class Effort:
     looked : int
         Points of the box at which the abscissa is evaluated; a power of two.
     begun : int
-        Descents begun at the best of them.
+        Descents begun at the best of them; with 0, none are looked at.
     steps : int
         Evaluations of each descent.
     sharpened : int
@@ -119,8 +119,11 @@ def global_search(
         only = Basin(lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
-    starts = [*(np.clip(g, lower, upper) for g in known), *starting_points(family, seed, effort)]
-    evaluations = 2 * effort.looked
+    starts = [np.clip(gains, lower, upper) for gains in known]
+    evaluations = 0
+    if effort.begun:
+        starts += list(starting_points(family, seed, effort))
+        evaluations += 2 * effort.looked
     ends = []
     for start in starts:
         end = bfgs(family.abscissa, start, lower, upper, most=effort.steps)
@@ -159,7 +162,7 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     order = np.argsort(values, kind="stable")
     deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
     placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
-    chosen = np.vstack([placed, points[order[: effort.begun - len(placed)]]])
+    chosen = np.vstack([placed, points[order[: max(0, effort.begun - len(placed))]]])
     return np.asarray(np.clip(chosen, inside[0], inside[1]))
 
 

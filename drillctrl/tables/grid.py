@@ -71,6 +71,8 @@ class Axis:
 
 def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
     """Return evenly spaced values, both ends included."""
+    for end in (low, high):
+        checked_number(name, end)
     if count == 1 and low == high:
         return Axis(name, (low,))
     if not 2 <= count <= MAX_NODES:

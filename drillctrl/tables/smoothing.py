@@ -12,6 +12,10 @@ from drillctrl.tables.grid import Grid
 
 _SWEEPS = 40
 _FRACTIONS = np.array([1.0, 0.7, 0.4, 0.2, 0.08, 0.03])
+# Gains that are good enough lie along thin curved valleys, so that the straight way to the
+# mean is often barred; steps in scattered directions find the way along.
+_SCATTERED = 8
+_RADII = (0.003, 0.01, 0.03, 0.1)
 
 
 def smooth_gains(
@@ -25,8 +29,8 @@ def smooth_gains(
 
     Each node is moved towards the mean of its neighbours, where the sum is least, as far
     as its α permits; nodes of one colour of a chequerboard move together. Beside points on
-    that way, the neighbours' own gains are tried, which leads out of another basin. The sum
-    never rises; what is reached is a local minimum.
+    that way, steps in scattered directions are tried and the neighbours' own gains, which
+    leads out of another basin. The sum never rises; what is reached need not be its minimum.
 
     Parameters
     ----------
@@ -60,8 +64,12 @@ def smooth_gains(
         beside[b].append(a)
     limit = (1.0 - give_up) * best
     current = gains.copy()
+    scatter = np.random.default_rng(0)
     for sweep in range(_SWEEPS):
         moved = 0.0
+        directions = scatter.normal(size=(_SCATTERED, gains.shape[1]))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        steps = [r * d * width for d in (*directions, *-directions) for r in _RADII]
         for parity in (0, 1):
             rows, trials = [], []
             for i in np.flatnonzero((colour == parity) & movable).tolist():
@@ -70,6 +78,8 @@ def smooth_gains(
                 around = current[beside[i]]
                 target = around.mean(axis=0)
                 options = [current[i] + f * (target - current[i]) for f in _FRACTIONS]
+                bent = [np.clip(current[i] + s, structure.lower, structure.upper) for s in steps]
+                options += bent
                 if sweep < 4:
                     options += list(around)
                 here = _cost(current[i], around, width)
