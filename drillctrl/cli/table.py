@@ -147,7 +147,7 @@ def _progress() -> Iterator[Progress | None]:
 
 
 def _read_grid(given: dict[str, Any]) -> Grid:
-    from drillctrl.tables.grid import dimensionless_grid, rig_grid
+    from drillctrl.tables.grid import dimensionless_grid
 
     groups = {k: given[k] for k in _GROUPS if k in given}
     rig = {k: given[k] for k in _RIG if k in given}
@@ -155,7 +155,7 @@ def _read_grid(given: dict[str, Any]) -> Grid:
         first = next(iter(groups))
         raise InputError(f"--{first}", groups[first], "left out where a rig is given")
     if rig:
-        return rig_grid(*_rig_axes(rig)[0], **_rig_axes(rig)[1])
+        return _rig_grid(rig)
     for name in ("omega0", "delta0"):
         if name not in groups:
             raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
@@ -168,13 +168,14 @@ def _read_grid(given: dict[str, Any]) -> Grid:
                 raise InputError(f"--{name}", groups[name], "left out where --damping is given")
             groups[name] = damping
     axes = {name: _axis(name, str(groups.pop(name, "14")), None) for name in _GROUPS[:3]}
-    first = {name: axis.values[0] for name, axis in axes.items()}
-    return dimensionless_grid(**axes, reference=OperatingPoint(**first, **groups))
+    corner = {name: axis.values[0] for name, axis in axes.items()}
+    return dimensionless_grid(**axes, reference=OperatingPoint(**corner, **groups))
 
 
-def _rig_axes(given: dict[str, str]) -> tuple[tuple[Any, Axis], dict[str, Axis]]:
+def _rig_grid(given: dict[str, str]) -> Grid:
     from drillctrl import units
     from drillctrl.rig import load_rig
+    from drillctrl.tables.grid import rig_grid
 
     for name in ("rig", "speed"):
         if name not in given:
@@ -187,13 +188,13 @@ def _rig_axes(given: dict[str, str]) -> tuple[tuple[Any, Axis], dict[str, Axis]]
         "wob": ("weight_on_bit", units.FORCE),
         "rock_strength": ("rock_strength", units.STRESS),
     }
-    axes = {
+    axes: dict[str, Any] = {
         name: _axis(option, given[option], dimension, name)
         for option, (name, dimension) in further.items()
         if option in given
     }
     speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
-    return (load_rig(given["rig"]), speed), axes
+    return rig_grid(load_rig(given["rig"]), speed, **axes)
 
 
 def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:

@@ -52,22 +52,17 @@ def to_document(table: GainTable) -> Document:
         name: np.array(values, dtype=float)
         for name, values in zip(table.columns, zip(*table.rows(), strict=True), strict=True)
     }
-    units = {name: "1" for name in columns}
+    units = dict.fromkeys(columns, "1")
     structure, rig = table.structure, table.grid.rig
     if rig is not None:
         for axis, values in zip(table.grid.axes, table.grid.coordinates.T, strict=True):
             columns[axis.name], units[axis.name] = values.copy(), axis.unit
         columns["delay_s"] = np.array([p.delay for p in table.grid.points]) * rig.time_scale
         units["delay_s"] = "s"
-        outputs = structure.outputs * (2 * len(structure.inputs))
-        if structure.inputs == ("torque",) and set(outputs) <= {"theta", "dtheta"}:
-            for name, output, values in zip(
-                structure.entry_names, outputs, table.entries.T, strict=True
-            ):
-                rate = output == "dtheta"
-                factor = rig.torsional_stiffness * (rig.time_scale if rate else 1.0)
-                columns[f"{name}_rig"] = factor * values
-                units[f"{name}_rig"] = "N*m*s/rad" if rate else "N*m/rad"
+        for name, (factor, unit), values in zip(
+            structure.entry_names, rig_gain_units(table) or [], table.entries.T, strict=False
+        ):
+            columns[f"{name}_rig"], units[f"{name}_rig"] = factor * values, unit
     header: dict[str, Any] = {
         "schema": SCHEMA,
         "drillctrl": metadata.version("drillctrl"),
@@ -104,6 +99,21 @@ def to_document(table: GainTable) -> Document:
     header = json.loads(json.dumps(header, allow_nan=False))
     header["checksum"] = checksum(header, columns)
     return Document(header, columns)
+
+
+def rig_gain_units(table: GainTable) -> list[tuple[float, str]] | None:
+    """Return factor and SI unit of each entry of (K1, K2); None without rig units for them."""
+    structure, rig = table.structure, table.grid.rig
+    if rig is None or structure.inputs != ("torque",):
+        return None
+    if not set(structure.outputs) <= {"theta", "dtheta"}:
+        return None
+    # θ is in radians already; θ' is per unit of time, u in units of Kt.
+    known = {
+        "theta": (rig.torsional_stiffness, "N*m/rad"),
+        "dtheta": (rig.torsional_stiffness * rig.time_scale, "N*m*s/rad"),
+    }
+    return [known[output] for output in structure.outputs] * 2
 
 
 def checksum(header: dict[str, Any], columns: dict[str, FloatArray]) -> str:
@@ -162,7 +172,10 @@ def _read(document: Document) -> GainTable:
     structure = FeedbackStructure(
         layout["name"],
         tuple(layout["outputs"]),
-        *(np.array(layout[name], dtype=float) for name in _BOUNDS),
+        np.array(layout["K1_lower"], dtype=float),
+        np.array(layout["K1_upper"], dtype=float),
+        np.array(layout["K2_lower"], dtype=float),
+        np.array(layout["K2_upper"], dtype=float),
         inputs=tuple(layout["inputs"]),
         ties=tuple(Tie(*tie) for tie in layout["ties"]),
     )

@@ -195,9 +195,7 @@ def dimensionless_grid(
     if reference is None:
         reference = OperatingPoint(*first)
     # The node-dependent groups of the reference say nothing; one grid has one reference.
-    reference = replace(
-        reference.with_changes(psi=first[2]), omega0=first[0], delta0=first[1]
-    )
+    reference = replace(reference.with_changes(psi=first[2]), omega0=first[0], delta0=first[1])
     return Grid((axes[0], axes[1], axes[2]), reference)
 
 

@@ -78,9 +78,7 @@ def place(grid: Grid, coordinates: FloatArray) -> Place:
     cell = np.ravel_multi_index(tuple(low), cell_shape(grid))
     corners, weights = [], []
     for offset in itertools.product((0, 1), repeat=3):
-        node = [
-            np.minimum(i + o, n - 1) for i, o, n in zip(low, offset, grid.shape, strict=True)
-        ]
+        node = [np.minimum(i + o, n - 1) for i, o, n in zip(low, offset, grid.shape, strict=True)]
         corners.append(np.ravel_multi_index(tuple(node), grid.shape))
         parts = [f if o else 1.0 - f for f, o in zip(fraction, offset, strict=True)]
         weights.append(parts[0] * parts[1] * parts[2])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, cell_shape
 from drillctrl.tables.table import GainTable
@@ -35,13 +36,13 @@ def plot_table(table: GainTable) -> Figure:
     from matplotlib.patches import Rectangle
 
     grid = table.grid
-    across = int(np.argmin(grid.shape[::-1]))
-    across = 2 - across
+    # Of equally short axes the last.
+    across = 2 - int(np.argmin(grid.shape[::-1]))
     down, up = (axis for axis in range(3) if axis != across)
     middle = grid.shape[across] // 2
 
-    def layer(values: np.ndarray) -> np.ndarray:
-        return np.take(values.reshape(grid.shape), middle, axis=across)
+    def layer(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.asarray(np.take(values.reshape(grid.shape), middle, axis=across))
 
     fields = dict(zip(table.structure.entry_names, table.entries.T, strict=True))
     fields = {k: v for k, v in fields.items() if np.ptp(v) > 0.0}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drillctrl.feedback import FeedbackStructure
+from drillctrl.feedback import BoolArray, FeedbackStructure
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.continuation import edges
@@ -110,7 +110,7 @@ def _cost(vector: FloatArray, around: FloatArray, width: FloatArray) -> float:
 
 
 def largest_jump(
-    grid: Grid, structure: FeedbackStructure, gains: FloatArray, counted: FloatArray
+    grid: Grid, structure: FeedbackStructure, gains: FloatArray, counted: BoolArray
 ) -> tuple[float, tuple[int, int] | None]:
     """Return the largest change of a gain between neighbours, and between which nodes.
 

@@ -79,9 +79,10 @@ class GainTable:
     @property
     def entries(self) -> FloatArray:
         """All entries of K1, then K2, row by row, at each node, (q, 2 m p)."""
-        return self._entries(self.gains)
+        return self.entries_of(self.gains)
 
-    def _entries(self, vectors: FloatArray) -> FloatArray:
+    def entries_of(self, vectors: FloatArray) -> FloatArray:
+        """Return all entries of K1, then K2, of gain vectors, (q, k) → (q, 2 m p)."""
         return np.asarray(self.structure.fixed + vectors @ self.structure.spread.T)
 
     @property
@@ -104,7 +105,7 @@ class GainTable:
         K1, K2 : array, (q, m, p)
         """
         where = place(self.grid, self.grid.locate(omega0, delta0, psi))
-        flat = self._entries(interpolated(where, self.gains, self.cells))
+        flat = self.entries_of(interpolated(where, self.gains, self.cells))
         half = flat.shape[1] // 2
         shape = (len(flat), *self.structure.K1_lower.shape)
         return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)
@@ -270,9 +271,7 @@ def table(
     gains = smooth_gains(grid, chosen, gains, best, share)
     if fallback == "off":
         gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
-    tasks = [
-        NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)
-    ]
+    tasks = [NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)]
     checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
     stable = np.array([check.stable for check in checks])
     return GainTable(
@@ -304,7 +303,5 @@ def _spread_out(
         yield from future.result()
 
 
-def _work_through(
-    work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
-) -> list[Result]:
+def _work_through(work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]) -> list[Result]:
     return [work(task) for task in tasks]

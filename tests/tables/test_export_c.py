@@ -7,8 +7,18 @@ import pytest
 from drillctrl import Controller, InputError, OperatingPoint, simulate
 from drillctrl.tables.export_c import export_c
 
-PERIOD, LIMIT = 0.01, 3.0
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-ffp-contract=off"]
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+# A sixteenth of the delay, so that the delayed output is a sample.
+PERIOD, LIMIT = POINT.delay / 16, 3.0
+FLAGS = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-Wconversion",
+    "-ffp-contract=off",
+]
 
 
 class Compiled:
@@ -16,7 +26,7 @@ class Compiled:
         header, source = export_c(
             table, folder, "drill", period=PERIOD, limit=LIMIT, real=real, ramp=ramp
         )
-        binary = folder / f"drill_{real}.so"
+        binary = folder / f"drill_{real}_{table.structure.name}.so"
         subprocess.run(
             ["gcc", *FLAGS, "-shared", "-fPIC", "-o", str(binary), str(source)],
             check=True, capture_output=True, text=True,
@@ -53,39 +63,37 @@ def test_lookup_equals_python(small, on_rig, tmp_path):
                 continue
             K1, K2 = table.gains_at(*groups)
             gains, vouched = compiled.lookup(place)
-            assert gains == pytest.approx([*K1.ravel(), *K2.ravel()], rel=1e-11, abs=1e-12)
+            expected = np.array([*K1.ravel(), *K2.ravel()])
+            rig = table.grid.rig
+            if rig is not None:
+                # N·m/rad and N·m·s/rad
+                expected *= rig.torsional_stiffness * np.array([1.0, rig.time_scale] * 2)
+            assert gains == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
             assert vouched == table.stable_at(*groups)[0]
 
 
 def test_same_command_as_the_simulator_over_a_stick_slip_transient(small, tmp_path):
-    point = OperatingPoint(10.0, 2.5, 14.0)
     K1, K2 = small.gains_at(10.0, 2.5, 14.0)
-    control = Controller("case1", K1[0], K2[0], activation=100.0, period=PERIOD, limit=LIMIT)
-    run = simulate(point, control, duration=130.0, initial={"dx": 1.0, "dtheta": 1.0})
+    start = 100.0
+    control = Controller("case1", K1[0], K2[0], activation=start, period=PERIOD, limit=LIMIT)
+    run = simulate(POINT, control, duration=130.0, initial={"dx": 1.0, "dtheta": 1.0})
     assert any(event.name == "stick" for event in run.events)
-    times = np.arange(0.0, 130.0, PERIOD)
-    theta = run.at(times).theta
+    samples = np.arange(-100, int(29.0 / PERIOD))
+    theta = run.at(start + samples * PERIOD).theta
+    held = run.at(start + (samples + 0.5) * PERIOD).torque
     compiled = Compiled(small, tmp_path)
-    law = np.zeros(len(times))
-    commanded = np.zeros(len(times))
-    for i, time in enumerate(times):
-        on = i >= 10_000
-        commanded[i] = compiled.step([theta[i]], (10.0, 2.5, 14.0), point.delay, int(on))
-        if on:
-            back = point.delay / PERIOD
-            whole = int(back)
-            then = (1 - back + whole) * theta[i - whole] + (back - whole) * theta[i - whole - 1]
-            law[i] = np.clip(K1.item() * theta[i] + K2.item() * then, -LIMIT, LIMIT)
-    assert np.abs(commanded - law).max() < 1e-12
-    assert np.abs(law).max() == LIMIT
-    # The simulator looks the delayed output up in its dense output, this one between samples.
-    held = run.at(times + 0.5 * PERIOD).torque
-    assert np.abs(held - commanded)[10_001:].max() < 1e-2
+    commanded = [
+        compiled.step([y], (10.0, 2.5, 14.0), POINT.delay, int(k >= 0))
+        for k, y in zip(samples.tolist(), theta.tolist(), strict=True)
+    ]
+    assert np.abs(held - commanded).max() < 1e-12
+    assert np.abs(held).max() == LIMIT
+    assert np.ptp(held[-500:]) > 1e-9
 
 
 def test_float_soft_start_and_switching(small, tmp_path):
     compiled = Compiled(small, tmp_path, real="float", ramp=10)
-    at, delay = (10.0, 2.5, 14.0), OperatingPoint(10.0, 2.5, 14.0).delay
+    at, delay = (10.0, 2.5, 14.0), POINT.delay
     off = [compiled.step([0.1], at, delay, 0) for _ in range(50)]
     on = [compiled.step([0.1], at, delay, 1) for _ in range(20)]
     K1, K2 = small.gains_at(*at)

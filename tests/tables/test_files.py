@@ -45,7 +45,17 @@ def test_csv_as_others_read_it(on_rig, tmp_path):
         header
     )
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    names = "omega0 delta0 psi K1_1 K1_2 K2_1 K2_2 spectral_abscissa stable".split()
+    names = [
+        "omega0",
+        "delta0",
+        "psi",
+        "K1_1",
+        "K1_2",
+        "K2_1",
+        "K2_2",
+        "spectral_abscissa",
+        "stable",
+    ]
     assert list(rows[0])[:9] == names
     assert float(rows[-1]["K1_2"]) == on_rig.entries[-1, 1]
     rig = on_rig.grid.rig

@@ -98,9 +98,9 @@ def test_a_worker_more_changes_nothing(small):
 def test_one_node_and_three_axes():
     single = table(dimensionless_grid(10.0, 1.75, 14.0), "p")
     assert single.jump == (0.0, None)
-    assert single.spectral_abscissa[0] == design(
-        OperatingPoint(10, 1.75, 14), "p"
-    ).spectral_abscissa
+    assert (
+        single.spectral_abscissa[0] == design(OperatingPoint(10, 1.75, 14), "p").spectral_abscissa
+    )
     cube = table(
         dimensionless_grid(
             Axis("omega0", (9.0, 10.0)), Axis("delta0", (1.0, 2.0)), Axis("psi", (14.0, 18.0))
