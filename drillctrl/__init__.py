@@ -11,11 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.delay_system import DelaySystem, plant_system
-    from drillctrl.designing import Design, analyze, design
+    from drillctrl.design_result import Design
+    from drillctrl.designing import analyze, design
     from drillctrl.errors import InputError
-    from drillctrl.feedback import FeedbackStructure, close_loop, preset_structure
+    from drillctrl.feedback import FeedbackStructure, Tie, close_loop, preset_structure
     from drillctrl.operating_point import OperatingPoint, RigPoint
+    from drillctrl.optimisation.objectives import (
+        Exact,
+        Requirements,
+        Robust,
+        SemiDiscrete,
+        WorstCase,
+    )
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
     from drillctrl.robustness import (
@@ -54,7 +63,8 @@ _HOME = {
     "Change": "simulation",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
-    "Design": "designing",
+    "Design": "design_result",
+    "Exact": "optimisation.objectives",
     "FeedbackStructure": "feedback",
     "GainTable": "tables.table",
     "Grid": "tables.grid",
@@ -62,15 +72,22 @@ _HOME = {
     "LoopAnalysis": "analysis",
     "OperatingPoint": "operating_point",
     "Plant": "plant",
+    "Requirements": "optimisation.objectives",
     "Rig": "rig",
     "RigPoint": "operating_point",
+    "Robust": "optimisation.objectives",
     "Root": "spectrum.roots",
     "Scenario": "simulation",
+    "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
+    "StabilityChart": "charts.stability_chart",
     "SteadyState": "steady_state",
+    "Tie": "feedback",
+    "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
+    "chart": "charts.stability_chart",
     "characteristic_roots": "spectrum.roots",
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
@@ -129,6 +146,7 @@ __all__ = [
     "Controller",
     "DelaySystem",
     "Design",
+    "Exact",
     "FeedbackStructure",
     "GainTable",
     "Grid",
@@ -136,16 +154,23 @@ __all__ = [
     "LoopAnalysis",
     "OperatingPoint",
     "Plant",
+    "Requirements",
     "Rig",
     "RigPoint",
+    "Robust",
     "Root",
     "Scenario",
+    "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
+    "StabilityChart",
     "SteadyState",
+    "Tie",
+    "WorstCase",
     "analyze",
     "analyze_loop",
     "characteristic_roots",
+    "chart",
     "close_loop",
     "compare_spectra",
     "count_right_of",

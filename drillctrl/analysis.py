@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.feedback import FeedbackStructure, close_loop
 from drillctrl.operating_point import OperatingPoint
+from drillctrl.plant import Plant
 from drillctrl.robustness import with_delay_factor
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
@@ -161,22 +163,23 @@ class Fragility:
     ----------
     rounded_gains : float
         With the gains rounded to three significant digits.
-    psi_low, psi_high : float
-        With ψ 5 % lower or higher.
-    delay_low, delay_high : float
-        With all delays 2 % shorter or longer.
+    psi_low, psi_high : float or None
+        With ψ 5 % lower or higher; None where the plant has no operating point.
+    delay_low, delay_high : float or None
+        With all delays 2 % shorter or longer; None without delays.
     """
 
     rounded_gains: float
-    psi_low: float
-    psi_high: float
-    delay_low: float
-    delay_high: float
+    psi_low: float | None
+    psi_high: float | None
+    delay_low: float | None
+    delay_high: float | None
 
     @property
     def worst(self) -> float:
-        """The largest of the five."""
-        return max(self.rounded_gains, self.psi_low, self.psi_high, self.delay_low, self.delay_high)
+        """The largest of them."""
+        values = (self.psi_low, self.psi_high, self.delay_low, self.delay_high)
+        return max(self.rounded_gains, *(value for value in values if value is not None))
 
 
 def round_to_digits(values: FloatArray, digits: int) -> FloatArray:
@@ -186,24 +189,54 @@ def round_to_digits(values: FloatArray, digits: int) -> FloatArray:
 
 
 def fragility(
-    point: OperatingPoint, feedback: FeedbackStructure, K1: FloatArray, K2: FloatArray
+    plant: DelaySystem,
+    perturbed: Mapping[str, DelaySystem],
+    feedback: FeedbackStructure,
+    K1: FloatArray,
+    K2: FloatArray,
 ) -> Fragility:
-    """Return the abscissa of a loop under small changes of gains, rock and delay."""
+    """Return the abscissa of a loop under small changes of gains, rock and delay.
 
-    def alpha(plant: DelaySystem, k1: FloatArray = K1, k2: FloatArray = K2) -> float:
-        return spectral_abscissa(close_loop(plant, feedback, k1, k2))
+    Parameters
+    ----------
+    plant : DelaySystem
+        As designed for.
+    perturbed : mapping
+        What `perturbed_plants` returns.
+    feedback, K1, K2 : FeedbackStructure and arrays
+        The feedback.
+    """
+    values = {
+        name: spectral_abscissa(close_loop(other, feedback, K1, K2))
+        for name, other in perturbed.items()
+    }
+    rounded = close_loop(plant, feedback, round_to_digits(K1, 3), round_to_digits(K2, 3))
+    names = ("psi_low", "psi_high", "delay_low", "delay_high")
+    return Fragility(spectral_abscissa(rounded), *(values.get(name) for name in names))
 
-    plant = plant_system(point, feedback.inputs)
-    psi_low, psi_high, delay_low, delay_high = map(alpha, perturbed_plants(point, feedback))
-    rounded = alpha(plant, round_to_digits(K1, 3), round_to_digits(K2, 3))
-    return Fragility(rounded, psi_low, psi_high, delay_low, delay_high)
 
+def perturbed_plants(
+    plant: DelaySystem,
+    point: OperatingPoint | None = None,
+    physics: Plant | None = None,
+) -> dict[str, DelaySystem]:
+    """Return plants by the names of `Fragility`'s fields, as far as they exist.
 
-def perturbed_plants(point: OperatingPoint, feedback: FeedbackStructure) -> list[DelaySystem]:
-    """Return the plants of `Fragility`: ψ 5 % lower and higher, delays 2 % shorter and longer."""
-    plant = plant_system(point, feedback.inputs)
-    rocks = [point.with_changes(psi=factor * point.psi) for factor in (0.95, 1.05)]
-    return [
-        *(plant_system(rock, feedback.inputs) for rock in rocks),
-        *(with_delay_factor(plant, factor) for factor in (0.98, 1.02)),
-    ]
+    Parameters
+    ----------
+    plant : DelaySystem
+        The plant as assumed.
+    point : OperatingPoint, optional
+        Where it drills; without it, ψ cannot change.
+    physics : Plant, optional
+        The plant's equations; by default `dimensionless_plant`.
+    """
+    changed = {}
+    if point is not None:
+        for name, factor in (("psi_low", 0.95), ("psi_high", 1.05)):
+            rock = point.with_changes(psi=factor * point.psi)
+            changed[name] = plant_system(rock, plant.input_names, physics)
+    if plant.delays:
+        changed["delay_low"] = with_delay_factor(plant, 0.98)
+        changed["delay_high"] = with_delay_factor(plant, 1.02)
+    return changed

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drillctrl.delay_system import plant_system
 from drillctrl.errors import InputError
 from drillctrl.files import replacing
 from drillctrl.spectrum.pseudospectral import approximate_roots, degree_for
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from drillctrl.designing import Design
+    from drillctrl.design_result import Design
 
 # Okabe and Ito's palette, told apart by colour-blind readers too.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
@@ -68,7 +67,7 @@ def plot_roots(design: Design, ax: Axes | None = None) -> Axes:
         By default new ones.
     """
     ax = new_axes() if ax is None else ax
-    series = [("without control", plant_system(design.point), "o", GREY)]
+    series = [("without control", design.plant, "o", GREY)]
     if design.structure is not None:
         series.append((f"with {design.structure.name}", design.system(), "x", BLUE))
     shown = []
@@ -112,7 +111,8 @@ def plot_roots(design: Design, ax: Axes | None = None) -> Axes:
     ax.set_xlabel("Re s")
     ax.set_ylabel("Im s")
     p = design.point
-    ax.set_title(f"Characteristic roots at ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}")
+    where = f" at ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}" if p else ""
+    ax.set_title(f"Characteristic roots{where}")
     for root in design.loop.dominant_roots:
         if root.multiplicity > 1:
             ax.annotate(

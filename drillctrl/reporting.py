@@ -1,177 +1,17 @@
-"""Designs in words for people and in fields for programs."""
+"""Designs in words for people."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import Any
-
-import numpy as np
 
 from drillctrl import units
 from drillctrl.analysis import LoopAnalysis
-from drillctrl.designing import Design
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.operating_point import RigPoint
-from drillctrl.robustness import delay_margin, stability_radius
-from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.spectrum.roots import Root
+from drillctrl.design_result import Design
+from drillctrl.fields import GIVE_UP, gain_units, has_alternative
+from drillctrl.optimisation.objectives import Robust, SemiDiscrete, WorstCase
 from drillctrl.steady_state import steady_state
 
-# Share of the decay rate that the alternative in the summary may lose.
-GIVE_UP = 0.05
 _SYMBOLS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'"}
-
-
-def finite_or_none(value: float) -> float | None:
-    """Return a float that JSON can hold; None for what is not finite."""
-    return float(value) if math.isfinite(value) else None
-
-
-def design_fields(design: Design) -> dict[str, Any]:
-    """Return the JSON fields of ``design`` and ``analyze``."""
-    point = dataclasses.asdict(design.point)
-    structure = design.structure
-    fields: dict[str, Any] = {
-        "schema": "drillctrl/design/1" if design.evaluations else "drillctrl/analyze/1",
-        "operating_point": {**point, "delay": design.point.delay},
-        "structure": structure.name if structure else None,
-        "outputs": list(structure.outputs) if structure else [],
-        "bounds": _bounds(structure) if structure else None,
-        "K1": design.K1.ravel().tolist(),
-        "K2": design.K2.ravel().tolist(),
-        **_loop_fields(design.loop),
-        "open_loop": {
-            "spectral_abscissa": design.open_loop.spectral_abscissa,
-            "stable": design.open_loop.stable,
-        },
-        "robustness": None,
-        "evaluations": design.evaluations,
-        "elapsed_seconds": design.elapsed_seconds,
-    }
-    if design.optimality is not None:
-        fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
-    if design.fragility is not None:
-        off = dataclasses.asdict(design.fragility)
-        fields["robustness"] = {**_distance_fields(design), "spectral_abscissa_with": off}
-    if design.optimality is not None and design.stable:
-        fields["alternative"] = _alternative_fields(design)
-    if design.rig_point is not None:
-        fields["rig"] = _rig_fields(design.rig_point, design)
-    return fields
-
-
-def _distance_fields(design: Design) -> dict[str, Any]:
-    radius = stability_radius(design.system())
-    fields: dict[str, Any] = {
-        "stability_radius": radius.value,
-        "stability_radius_lower_bound": radius.lower_bound,
-        "delay_margin": None,
-    }
-    if design.stable:
-        margin = delay_margin(design.system())
-        fields["delay_margin"] = {
-            "shorter": margin.shorter,
-            "longer": finite_or_none(margin.longer),
-        }
-    return fields
-
-
-def _alternative_fields(design: Design) -> dict[str, Any]:
-    other = design.robust_alternative(GIVE_UP)
-    assert other.fragility is not None
-    return {
-        "give_up": GIVE_UP,
-        "K1": other.K1.ravel().tolist(),
-        "K2": other.K2.ravel().tolist(),
-        "spectral_abscissa": other.spectral_abscissa,
-        "stable": other.stable,
-        "robustness": {
-            **_distance_fields(other),
-            "spectral_abscissa_with": dataclasses.asdict(other.fragility),
-        },
-    }
-
-
-def _bounds(structure: FeedbackStructure) -> dict[str, list[list[float]]]:
-    pairs = {}
-    for name, low, high in (
-        ("K1", structure.K1_lower, structure.K1_upper),
-        ("K2", structure.K2_lower, structure.K2_upper),
-    ):
-        pairs[name] = np.column_stack([low.ravel(), high.ravel()]).tolist()
-    return pairs
-
-
-def _root_fields(root: Root) -> dict[str, Any]:
-    return {
-        "real": root.real,
-        "imag": root.imag,
-        "multiplicity": root.multiplicity,
-        "spread": root.spread,
-        "residual": root.residual,
-        "condition": finite_or_none(root.condition),
-        "converged": root.converged,
-    }
-
-
-def _loop_fields(loop: LoopAnalysis) -> dict[str, Any]:
-    radius = loop.spectral_radius
-    return {
-        "spectral_abscissa": loop.spectral_abscissa,
-        "spectral_abscissa_error": finite_or_none(loop.abscissa_error),
-        "stable": loop.stable,
-        "settling_time": finite_or_none(loop.settling_time),
-        "dominant_roots": [_root_fields(root) for root in loop.dominant_roots],
-        "spectral_radius": None
-        if radius is None
-        else {
-            "value": radius.value,
-            "m": radius.m,
-            "order": radius.order,
-            "growth_rate": finite_or_none(radius.growth_rate),
-        },
-        "certificate": {
-            "method": "argument principle",
-            **dataclasses.asdict(loop.certificate),
-        },
-    }
-
-
-def gain_units(structure: FeedbackStructure, rig_point: RigPoint) -> tuple[FloatArray, list[str]]:
-    """Return the SI value of each unit gain of one row, and its unit.
-
-    A torque is counted in Kt per rad, a rate in radians per time unit; an axial force in
-    the rig's axial force unit.
-    """
-    rig = rig_point.rig
-    factors, names = [], []
-    for output in structure.outputs:
-        rate, axial = output.startswith("d"), output.endswith("x")
-        scale = rig.torsional_stiffness * (rig.time_scale if rate else 1.0)
-        factors.append(scale / (rig.axial_scale if axial else 1.0))
-        names.append(f"N·m{'·s' if rate else ''}/{'m' if axial else 'rad'}")
-    return np.array(factors), names
-
-
-def _rig_fields(rig_point: RigPoint, design: Design) -> dict[str, Any]:
-    steady = steady_state(rig_point)
-    fields: dict[str, Any] = {
-        "parameters": dataclasses.asdict(rig_point.rig),
-        "rotary_speed": rig_point.rotary_speed,
-        "penetration_rate": rig_point.penetration_rate,
-        "time_scale": rig_point.rig.time_scale,
-        "axial_scale": rig_point.rig.axial_scale,
-        **dataclasses.asdict(steady),
-    }
-    if design.structure is not None and design.structure.inputs == ("torque",):
-        factors, names = gain_units(design.structure, rig_point)
-        fields["K1"] = (design.K1 * factors).ravel().tolist()
-        fields["K2"] = (design.K2 * factors).ravel().tolist()
-        fields["gain_units"] = names
-    settling = design.loop.settling_time * rig_point.rig.time_scale
-    fields["settling_time_seconds"] = finite_or_none(settling)
-    return fields
 
 
 def design_summary(design: Design) -> str:
@@ -204,14 +44,16 @@ def _point_lines(design: Design) -> _Lines:
                 f"cut {steady.depth_of_cut * 1e3:.4g} mm per turn",
             ),
         ]
-    damping = f"ξ = κ = {p.xi:.6g}" if p.xi == p.kappa else f"ξ = {p.xi:.6g}, κ = {p.kappa:.6g}"
-    lines.append(
-        (
-            "Point",
-            f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}, "
-            f"η = {p.eta:.6g}, {damping}, {p.blades} blades; τ0 = {p.delay:.6g}",
-        )
-    )
+    if p is None:
+        plant = design.plant
+        delays = ", ".join(f"{tau:.6g}" for tau in plant.delays) or "none"
+        lines.append(("Plant", f"{plant.order} states; delays {delays}"))
+    else:
+        same = p.xi == p.kappa
+        damping = f"ξ = κ = {p.xi:.6g}" if same else f"ξ = {p.xi:.6g}, κ = {p.kappa:.6g}"
+        text = f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}, "
+        text += f"η = {p.eta:.6g}, {damping}, {p.blades} blades; τ0 = {p.delay:.6g}"
+        lines.append(("Point", text))
     open_loop = design.open_loop
     state = "stable" if open_loop.stable else "unstable"
     if design.structure is not None:
@@ -263,7 +105,7 @@ def _verdict_lines(design: Design) -> _Lines:
         verdict = f"not stabilised: best α = {_alpha(loop)}"
     else:
         verdict = f"not stabilised: α = {_alpha(loop)}"
-    lines: _Lines = [(label, verdict)]
+    lines: _Lines = [(label, verdict), *_objective_lines(design)]
     roots = [
         f"{root.real:.6f}{f' ± {root.imag:.6f}i' if root.imag else ''}"
         + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else "")
@@ -299,11 +141,12 @@ def _verdict_lines(design: Design) -> _Lines:
         lines.append(("Optimal by", text))
         text = f"{best.hits} descent(s) ended here, {best.basins} distinct end(s)"
         if best.next_best is not None:
-            text += f", next best α = {best.next_best:.4f}"
+            text += f", next best {best.next_best:.4f}"
         lines.append(("", text))
+        lines += _boundary_lines(design)
     if design.fragility is not None:
         lines += _robustness_lines(design)
-    if design.optimality is not None and design.stable:
+    if has_alternative(design):
         other = design.robust_alternative(GIVE_UP)
         names = [*zip(("K1", "K2"), (other.K1, other.K2), strict=True)]
         gains = "; ".join(
@@ -318,22 +161,67 @@ def _verdict_lines(design: Design) -> _Lines:
     return lines
 
 
+def _objective_lines(design: Design) -> _Lines:
+    """Say what was minimised and required, where that is not the spectral abscissa alone."""
+    lines: _Lines = []
+    match design.objective:
+        case SemiDiscrete(m=m, order=order):
+            goal = f"ln ρ(D)/Δt of the semi-discretisation (m = {m}, order {order})"
+        case WorstCase() as case:
+            assert design.point is not None
+            goal = f"largest α of {len(case.around(design.point))} points"
+        case Robust(epsilon=epsilon):
+            goal = f"largest Re s with relative errors of the plant up to {epsilon:g}"
+        case _:
+            goal = ""
+    if goal:
+        lines.append(("Minimised", f"{goal}: {design.objective_value:.9f}"))
+    if design.requirements:
+        wanted = (
+            ("decay rate ≥ {:g}", design.requirements.decay),
+            ("stability radius ≥ {:g}", design.requirements.stability_radius),
+            ("input gain ≤ {:g}", design.requirements.input_gain),
+        )
+        text = ", ".join(form.format(value) for form, value in wanted if value is not None)
+        lines.append(("Required", f"{text}: {'met' if design.requirements_met else 'NOT MET'}"))
+    return lines
+
+
+def _boundary_lines(design: Design) -> _Lines:
+    """Say what is known of all gains within the bounds."""
+    decision = design.boundary
+    if decision is None:
+        if design.stable:
+            return []
+        return [("", "a failed search is no proof: with more than two gains none is known")]
+    where = f"explicit boundary, {decision.points} places"
+    if not design.stable:
+        if decision.possible:
+            return [("", f"BUT some gains within the bounds stabilise ({where})")]
+        return [("Impossible", f"no gains within the bounds stabilise ({where})")]
+    if decision.possible:
+        return [("", f"BUT some gains within the bounds reach α = {decision.line:.6g} ({where})")]
+    return [("", f"no gains within the bounds reach α = {decision.line:.6g} ({where})")]
+
+
 def _robustness_lines(design: Design) -> _Lines:
     """Say how near instability is, and what small errors do."""
     lines: _Lines = []
     off = design.fragility
     if design.stable:
-        radius, margin = stability_radius(design.system()), delay_margin(design.system())
-        lines.append(("Margins", f"relative errors of the matrices below {radius.lower_bound:.2g}"))
+        radius = design.stability_radius
+        lines.append(("Margins", f"relative errors of the plant below {radius.lower_bound:.2g}"))
+    if (margin := design.delay_margin) is not None:
         longer = "any" if math.isinf(margin.longer) else f"{margin.longer:.4g}"
         lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times τ0"))
     if off is not None:
-        lines += [
-            ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits"),
-            ("", f"{off.psi_low:.4f} and {off.psi_high:.4f} with ψ 5 % lower or higher"),
-            (
-                "",
-                f"{off.delay_low:.4f} and {off.delay_high:.4f} with τ0 2 % shorter or longer",
-            ),
-        ]
+        lines.append(
+            ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits")
+        )
+        if off.psi_low is not None and off.psi_high is not None:
+            text = f"{off.psi_low:.4f} and {off.psi_high:.4f} with ψ 5 % lower or higher"
+            lines.append(("", text))
+        if off.delay_low is not None and off.delay_high is not None:
+            text = f"{off.delay_low:.4f} and {off.delay_high:.4f} with τ0 2 % shorter or longer"
+            lines.append(("", text))
     return lines

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
 
@@ -25,8 +26,13 @@ from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_out
     metavar="GAIN=LOW:HIGH",
     help="For K1, K2 or one gain such as K1_2; may be repeated.",
 )
+@objective_options
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
-@click.option("--require-stable", is_flag=True, help="Exit with 3 if nothing stabilises.")
+@click.option(
+    "--require-stable",
+    is_flag=True,
+    help="Exit with 3 if nothing stabilises, or a requirement is not met.",
+)
 @root_output_options
 def design_command(
     structure: str,
@@ -37,7 +43,7 @@ def design_command(
     as_json: bool,
     out: str | None,
     plot: str | None,
-    **point: Any,
+    **options: Any,
 ) -> None:
     """Find the gains within bounds that make vibrations decay fastest.
 
@@ -45,12 +51,21 @@ def design_command(
     Examples:
       drillctrl design --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case2
       drillctrl design --omega0 10 --delta0 12 --psi 14 --bound K1=-5:5 --json
+      drillctrl design --objective worst-case --psi-error 0.2 --min-decay 0.1
     """
     check_outputs(out, plot)
-    where = read_point(point)
+    objective, requirements = read_objective(options)
+    where = read_point(options)
     from drillctrl.designing import design
 
-    result = design(where, structure, bounds=read_bounds(bound), seed=seed)
+    result = design(
+        where,
+        structure,
+        bounds=read_bounds(bound),
+        objective=objective,
+        requirements=requirements,
+        seed=seed,
+    )
     deliver(result, prove, as_json, out, plot)
-    if require_stable and not result.stable:
+    if require_stable and not (result.stable and result.requirements_met):
         raise click.exceptions.Exit(NOT_STABILISED)

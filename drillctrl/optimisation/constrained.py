@@ -124,6 +124,9 @@ def constrained_search(
             gains = np.clip(gains, lower + 1e-6 * margin, upper - 1e-6 * margin)
     feasible = bool(np.isfinite(watched.best[0]))
     value, gains = watched.best if feasible else watched.nearest[1:]
+    # A bound that is approached to rounding is meant.
+    for bound in (lower, upper):
+        gains = np.where(np.abs(gains - bound) < 1e-9 * (upper - lower), bound, gains)
     distinct: list[float] = []
     for end in sorted(ends):
         if not distinct or end > distinct[-1] + 1e-3 * (1.0 + abs(end)):

@@ -128,9 +128,12 @@ class LoopFamily:
         """Return the collocated spectral abscissa at many gain vectors, (q, k) → (q,)."""
         if len(gains) == 0:
             return np.zeros(0)
+        return np.asarray(np.linalg.eigvals(self.matrices(gains)).real.max(axis=1))
+
+    def matrices(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated generator at many gain vectors, (r, k) → (r, q, q)."""
         entries = gains @ self.spread.T
-        stack = self.base + (self.actuation * entries[:, None, :]) @ self.measurement
-        return np.asarray(np.linalg.eigvals(stack).real.max(axis=1))
+        return np.asarray(self.base + (self.actuation * entries[:, None, :]) @ self.measurement)
 
     def active_gradients(
         self, gains: FloatArray, width: float = 1e-6

@@ -105,7 +105,7 @@ def _frequencies(family: LoopFamily, gains: FloatArray, line: float) -> FloatArr
 
 
 def _sigma(family: LoopFamily, gains: FloatArray, line: float, omega: FloatArray) -> FloatArray:
-    delta = family.characteristic_matrix(line + 1j * omega, gains)
+    delta = family.characteristic_matrix(np.asarray(line + 1j * omega), gains)
     return np.asarray(np.linalg.svd(delta, compute_uv=False)[:, -1])
 
 
@@ -123,9 +123,9 @@ def _lowest(function: Callable[[FloatArray], FloatArray], omega: FloatArray) -> 
     values = function(omega)
     inner = np.r_[np.inf, values, np.inf]
     dips = np.flatnonzero((inner[1:-1] <= inner[:-2]) & (inner[1:-1] <= inner[2:]))
-    dips = dips[np.argsort(values[dips], kind="stable")[:_REFINED]]
+    dips = np.asarray(dips[np.argsort(values[dips], kind="stable")[:_REFINED]])
     best = float(omega[dips[0]]), float(values[dips[0]])
-    for i in dips:
+    for i in dips.tolist():
         low, high = omega[max(i - 1, 0)], omega[min(i + 1, omega.size - 1)]
         found = scipy.optimize.minimize_scalar(
             lambda w: float(function(np.array([w]))[0]),
@@ -202,7 +202,7 @@ def _settled(
 ) -> tuple[_Nearest, float]:
     """Return what is found at a frequency, and a step towards the nearest dip of σ_min."""
     h = 1e-4 * (1.0 + frequency)
-    s = line + 1j * (frequency + h * np.array([-1.0, 0.0, 1.0]))
+    s = np.asarray(line + 1j * (frequency + h * np.array([-1.0, 0.0, 1.0])), dtype=complex)
     u, size, vh = np.linalg.svd(family.characteristic_matrix(s, gains))
     low, here, high = size[:, -1]
     bend = (low - 2.0 * here + high) / h**2
@@ -229,7 +229,7 @@ def inverse_input_gain(family: LoopFamily) -> Objective:
         seen = family.seen_at(s) @ np.linalg.solve(
             delta, np.broadcast_to(drive, (len(s), *drive.shape))
         )
-        return (target * (family.spread @ gains)) @ seen, seen
+        return np.asarray((target * (family.spread @ gains)) @ seen), np.asarray(seen)
 
     def objective(gains: FloatArray) -> tuple[float, FloatArray]:
         alpha, slope = family.abscissa(gains)
@@ -238,7 +238,7 @@ def inverse_input_gain(family: LoopFamily) -> Objective:
         omega = _frequencies(family, gains, 0.0)
 
         def inverse(points: FloatArray) -> FloatArray:
-            size = np.linalg.norm(transfer(1j * points, gains)[0], 2, axis=(1, 2))
+            size = np.linalg.norm(transfer(np.asarray(1j * points), gains)[0], 2, axis=(1, 2))
             return np.asarray(1.0 / np.maximum(size, 1e-9))
 
         where, value = _lowest(inverse, omega)

@@ -128,3 +128,7 @@ class Requirements:
 
     def __bool__(self) -> bool:
         return any(v is not None for v in (self.decay, self.stability_radius, self.input_gain))
+
+
+EXACT = Exact()
+NO_REQUIREMENTS = Requirements()

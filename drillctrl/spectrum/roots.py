@@ -171,14 +171,18 @@ def _gather(
         inside = values[(values.imag >= 0) & (size <= 1.1 * reach)]
         floor = line
         if floor is None:
-            if inside.size == 0 or inside.real.max() - depth < sure:
-                top = float(inside.real.max()) if inside.size else sure - depth
-                sure = min(top, sure) - depth - 0.01 * (1.0 + abs(top))
+            while inside.size == 0 or inside.real.max() - depth < sure:
+                if inside.size:
+                    top = float(inside.real.max())
+                    sure = min(top, sure) - depth - 0.01 * (1.0 + abs(top))
+                else:
+                    sure -= 0.5 / system.max_delay
                 reach = characteristic.magnitude_bound(system, sure)
                 degree = max(degree, degree_for_reach(reach * system.max_delay))
-                if inside.size == 0 or degree < MAX_DEGREE:
-                    values = generator_eigenvalues(system, degree)
-                    inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
+                values = generator_eigenvalues(system, degree)
+                inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
+                if inside.size and degree >= MAX_DEGREE:
+                    break
             floor = float(inside.real.max()) - depth
         # Starting values of a k-fold root are off by the k-th root of the error.
         slack = 0.02

@@ -190,3 +190,10 @@ def test_too_far_left_is_refused(plant_c):
         characteristic_roots(plant_c, -200.0)
     with pytest.raises(InputError, match="right_of = nan"):
         characteristic_roots(plant_c, math.nan)
+
+
+def test_roots_far_left_of_the_first_line_are_found():
+    """x' = -x(t - 1/2): the line at which the bound is first drawn encloses no root."""
+    system = DelaySystem([[0.0]], ([[-1.0]],), (0.5,), [[1.0]], [[1.0]])
+    exact = lambertw(-0.5) / 0.5
+    assert spectral_abscissa(system) == pytest.approx(exact.real, abs=1e-12)

@@ -1,0 +1,1 @@
+"""Stability charts and volumes from explicit boundaries."""

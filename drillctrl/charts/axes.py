@@ -1,0 +1,119 @@
+"""What a chart may be drawn over: groups of the point, numbers of the rig, gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drillctrl import units
+from drillctrl.errors import InputError, checked_number
+from drillctrl.feedback import FeedbackStructure
+from drillctrl.operating_point import RigPoint
+from drillctrl.units import Dimension
+
+# Permitted range and symbol of each dimensionless group.
+GROUPS = {
+    "omega0": (0.0, 1e4, "ω₀"),
+    "delta0": (0.0, 1e4, "δ₀"),
+    "psi": (0.0, 1e4, "ψ"),
+    "eta": (1e-3, 1e3, "η"),
+    "xi": (0.0, 1e2, "ξ"),
+    "kappa": (0.0, 1e2, "κ"),
+    "damping": (0.0, 1e2, "ξ = κ"),
+}
+RIG_AXES: dict[str, tuple[str, Dimension, str]] = {
+    "speed": ("rpm", units.ROTARY_SPEED, "rotary speed"),
+    "rop": ("m/h", units.SPEED, "rate of penetration"),
+    "rock_strength": ("MPa", units.STRESS, "rock strength ε"),
+}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a chart.
+
+    Attributes
+    ----------
+    name : str
+        A group (``"omega0"``), a gain (``"K1_1"``) or a rig number (``"speed"``).
+    low, high : float
+        Limits, in ``unit``.
+    unit : str
+        Empty where dimensionless.
+    label : str
+        Symbol and unit, for figures.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    label: str
+
+    @property
+    def span(self) -> float:
+        """high − low."""
+        return self.high - self.low
+
+
+def make_axis(
+    given: Axis | Sequence[object], structure: FeedbackStructure | None, rig_point: RigPoint | None
+) -> Axis:
+    """Check an axis given as (name, low, high).
+
+    Parameters
+    ----------
+    given : Axis or sequence
+        Limits are numbers; for rig axes numbers in rpm, m/h or MPa, or texts with a unit.
+    structure : FeedbackStructure or None
+        Whose gains may be axes.
+    rig_point : RigPoint or None
+        Without it there are no rig axes.
+
+    Raises
+    ------
+    InputError
+        If there is no such axis, or the limits are swapped or out of range.
+    """
+    if isinstance(given, Axis):
+        return given
+    try:
+        name, low, high = given
+    except (TypeError, ValueError):
+        raise InputError("axis", repr(given), "a name and two limits") from None
+    gains = structure.gain_names if structure is not None else ()
+    rigs = tuple(RIG_AXES) if rig_point is not None else ()
+    known = (*GROUPS, *rigs, *gains)
+    if not isinstance(name, str) or name not in known:
+        raise InputError("axis", str(name), f"one of {', '.join(known)}")
+    floor, ceiling, unit, label = -1e6, 1e6, "", gain_label(name)
+    if name in GROUPS:
+        floor, ceiling, label = GROUPS[name]
+    elif name in RIG_AXES:
+        floor, ceiling = 0.0, 1e6
+        unit, dimension, word = RIG_AXES[name]
+        label = f"{word}, {unit}"
+        low, high = (_in_unit(name, v, unit, dimension) for v in (low, high))
+    low = checked_number(f"{name} (lower limit)", low, floor, ceiling)
+    high = checked_number(f"{name} (upper limit)", high, floor, ceiling)
+    if not low < high:
+        raise InputError(f"limits of {name}", f"{low:g}:{high:g}", "lower:upper with lower < upper")
+    return Axis(name, low, high, unit, label)
+
+
+def _in_unit(name: str, value: object, unit: str, dimension: Dimension) -> object:
+    if not isinstance(value, str):
+        return value
+    return units.from_si(units.to_si(name, value, dimension), dimension, unit)
+
+
+def gain_label(name: str) -> str:
+    """Return a gain's symbol, such as K₁,₂ for ``K1_2``."""
+    digits = str.maketrans("0123456789_", "₀₁₂₃₄₅₆₇₈₉,")
+    return name[:1] + name[1:].translate(digits)
+
+
+def to_si_factor(name: str) -> float:
+    """Return the SI value of one unit of a rig axis."""
+    unit, dimension, _ = RIG_AXES[name]
+    return units.to_si(name, f"1 {unit}", dimension)

@@ -1,0 +1,92 @@
+"""`drillctrl chart`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from drillctrl.cli.gains import read_gains
+from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.errors import InputError
+
+
+def read_axis(option: str, text: str) -> tuple[str, object, object]:
+    """Return name and limits from a text such as ``omega0=0.5:25`` or ``rop=0:40 m/h``.
+
+    Raises
+    ------
+    InputError
+        If the text has not that form.
+    """
+    name, equals, interval = text.partition("=")
+    low, colon, high = (part.strip() for part in interval.partition(":"))
+    if not (equals and colon and low and high):
+        raise InputError(option, text, "of the form omega0=0.5:25 or 'speed=30:200 rpm'")
+    unit = " ".join(high.split()[1:])
+    if unit and " " not in low:
+        low = f"{low} {unit}"
+    limits: list[object] = []
+    for part in (low, high):
+        try:
+            limits.append(float(part))
+        except ValueError:
+            limits.append(part)
+    return name.strip(), limits[0], limits[1]
+
+
+@click.command(name="chart")
+@point_options
+@click.option("--x", "x_axis", default="omega0=0.5:25", show_default=True, metavar="NAME=LOW:HIGH")
+@click.option("--y", "y_axis", default="delta0=0:15", show_default=True, metavar="NAME=LOW:HIGH")
+@click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
+@click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
+@click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
+@click.option(
+    "--level", type=float, default=0.0, help="Ask for all roots left of this instead of 0."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--out", metavar="FILE.json", help="Also write that object to a file.")
+@click.option("--plot", metavar="FILE", help="Draw the chart (.png, .svg or .pdf).")
+def chart_command(
+    x_axis: str,
+    y_axis: str,
+    structure: str | None,
+    k1: str | None,
+    k2: str | None,
+    level: float,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **point: Any,
+) -> None:
+    """Draw where the rig drills without vibration, over any two parameters.
+
+    \b
+    Axes: omega0, delta0, psi, eta, xi, kappa, damping; gains such as K1_1;
+    with --rig also speed (rpm), rop (m/h) and rock_strength (MPa).
+
+    \b
+    Examples:
+      drillctrl chart --x omega0=0:25 --y delta0=0:15 --psi 14 --plot chart.png
+      drillctrl chart --x K1_1=-10:10 --y K2_1=-10:10 --structure case1
+      drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
+          --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 -2
+    """
+    check_json(out)
+    check_figure(plot)
+    where = read_point(point)
+    x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
+    gains = read_gains("K1", k1), read_gains("K2", k2)
+    from drillctrl.charts.stability_chart import chart
+
+    result = chart(where, x, y, structure, *gains, level=level)
+    fields = result.to_dict()
+    if out is not None:
+        write_json(out, fields)
+    if plot is not None:
+        figure = result.plot().get_figure(root=True)
+        assert figure is not None
+        write_figure(plot, figure)
+    click.echo(json_text(fields) if as_json else result.summary())

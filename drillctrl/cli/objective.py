@@ -1,0 +1,95 @@
+"""What a design minimises and must fulfil, as options of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.optimisation.objectives import Objective, Requirements
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+# Options that belong to one objective, and the parameter of it that they set.
+_BELONGS = {
+    "semidiscrete": {"m": "m", "order": "order"},
+    "worst-case": {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"},
+    "robust": {"epsilon": "epsilon"},
+}
+_REQUIREMENTS = {
+    "min_decay": "decay",
+    "min_radius": "stability_radius",
+    "max_input_gain": "input_gain",
+}
+
+
+def objective_options(command: Command) -> Command:
+    """Add the options that say what is minimised and required."""
+    options = [
+        click.option(
+            "--objective",
+            default="exact",
+            show_default=True,
+            help="exact: α; semidiscrete: ρ(D); worst-case: largest α when the point is off; "
+            "robust: largest Re s when the plant's matrices are off.",
+        ),
+        click.option("--m", type=int, help="Intervals (semidiscrete; default 40)."),
+        click.option("--order", type=int, help="0, 1 or 2 (semidiscrete; default 0)."),
+        click.option("--psi-error", type=float, help="Relative (worst-case; default 0.05)."),
+        click.option("--delta0-error", type=float, help="Relative (worst-case; default 0)."),
+        click.option("--omega0-error", type=float, help="Relative (worst-case; default 0)."),
+        click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
+        click.option("--min-decay", type=float, help="Require α ≤ −this."),
+        click.option("--min-radius", type=float, help="Require this stability radius."),
+        click.option(
+            "--max-input-gain",
+            type=float,
+            help="Require at most this peak of control torque per disturbance torque.",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def read_objective(options: dict[str, Any]) -> tuple[Objective, Requirements]:
+    """Take the options of `objective_options` out of a mapping.
+
+    Raises
+    ------
+    InputError
+        If the objective is unknown, or an option belongs to another one.
+    """
+    from drillctrl.optimisation.objectives import (
+        Exact,
+        Requirements,
+        Robust,
+        SemiDiscrete,
+        WorstCase,
+    )
+
+    kinds: dict[str, Callable[..., Objective]] = {
+        "exact": Exact,
+        "semidiscrete": SemiDiscrete,
+        "worst-case": WorstCase,
+        "robust": Robust,
+    }
+    name = options.pop("objective")
+    if name not in kinds:
+        raise InputError("--objective", name, f"one of {', '.join(kinds)}")
+    chosen = {}
+    for owner, names in _BELONGS.items():
+        for option, parameter in names.items():
+            value = options.pop(option)
+            if value is None:
+                continue
+            if owner != name:
+                flag = "--" + option.replace("_", "-")
+                raise InputError(flag, value, f"left out unless --objective is {owner}")
+            chosen[parameter] = value
+    required = {parameter: options.pop(option) for option, parameter in _REQUIREMENTS.items()}
+    return kinds[name](**chosen), Requirements(**required)
