@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.analysis import analyze_roots
+from drillctrl.analysis import analyze_loop
 from drillctrl.delay_system import plant_system
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import OperatingPoint
@@ -88,7 +88,7 @@ def design_node(task: NodeTask) -> NodeDesign:
     return NodeDesign(
         task.index,
         gains,
-        analyze_roots(family.loop(gains)).spectral_abscissa,
+        analyze_loop(family.loop(gains)).spectral_abscissa,
         certify_optimality(family, gains, search).stationarity,
         tuple(basin.gains for basin in search.basins[1:_KEPT]),
     )
@@ -107,5 +107,5 @@ class NodeCheck:
 def check_node(task: NodeTask) -> NodeCheck:
     """Analyse the loop that the first known gains close at a node."""
     family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
-    loop = analyze_roots(family.loop(task.known[0]))
+    loop = analyze_loop(family.loop(task.known[0]))
     return NodeCheck(task.index, loop.spectral_abscissa, loop.stable, loop.certificate.agrees)
