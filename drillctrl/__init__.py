@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
     from drillctrl.charts.stability_chart import StabilityChart, chart
+    from drillctrl.comparison.comparing import Comparison, compare
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.design_result import Design
     from drillctrl.designing import analyze, design
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from drillctrl.interop.controllers import controller_system, scheduled_controller
     from drillctrl.interop.lifted import lifted_system, pade_approximation
     from drillctrl.interop.plants import from_control
-    from drillctrl.interop.responses import time_response
     from drillctrl.operating_point import OperatingPoint, RigPoint
     from drillctrl.optimisation.objectives import (
         Exact,
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Axis": "tables.grid",
     "Change": "simulation",
+    "Comparison": "comparison.comparing",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
     "Design": "design_result",
@@ -90,6 +91,7 @@ _HOME = {
     "characteristic_roots": "spectrum.roots",
     "chart": "charts.stability_chart",
     "close_loop": "feedback",
+    "compare": "comparison.comparing",
     "compare_spectra": "spectrum.comparison",
     "controller_system": "interop.controllers",
     "count_right_of": "spectrum.count",
@@ -131,7 +133,6 @@ _HOME = {
     "steady_state": "steady_state",
     "table": "tables.table",
     "table1": "rig",
-    "time_response": "interop.responses",
     "to_frd": "transfer",
     "top_drive_plant": "top_drive",
     "with_actuator_lag": "instrumentation",
@@ -154,6 +155,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "Axis",
     "Change",
+    "Comparison",
     "Controller",
     "DelaySystem",
     "Design",
@@ -183,6 +185,7 @@ __all__ = [
     "characteristic_roots",
     "chart",
     "close_loop",
+    "compare",
     "compare_spectra",
     "controller_system",
     "count_right_of",
@@ -224,7 +227,6 @@ __all__ = [
     "steady_state",
     "table",
     "table1",
-    "time_response",
     "to_frd",
     "top_drive_plant",
     "with_actuator_lag",

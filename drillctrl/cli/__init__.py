@@ -8,6 +8,7 @@ import click
 
 from drillctrl.cli.analyze import analyze_command
 from drillctrl.cli.chart import chart_command
+from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
 from drillctrl.cli.simulate import simulate_command
 from drillctrl.cli.table import table_command
@@ -26,7 +27,14 @@ def cli() -> None:
     """
 
 
-for _command in (design_command, analyze_command, chart_command, simulate_command, table_command):
+for _command in (
+    design_command,
+    analyze_command,
+    chart_command,
+    compare_command,
+    simulate_command,
+    table_command,
+):
     cli.add_command(_command)
 
 

@@ -21,7 +21,6 @@ from drillctrl import (
     semidiscretize,
     simulate,
     spectral_abscissa,
-    time_response,
 )
 
 GAINS = [-5.03, -4.91], [-1.67, -0.31]
@@ -162,13 +161,10 @@ def test_sampled_controllers_agree_with_the_simulator():
 
 def test_responses_plot_in_python_control():
     run = simulate(OperatingPoint(10.0, 1.0, 14.0), duration=5.0, initial={"dx": 1.0})
-    response = time_response(run, 101)
-    assert response.time.shape == (101,)
-    assert response.outputs.shape == (4, 101)
+    response = run.to_control()
+    assert list(response.output_labels)[:4] == ["x", "dx", "theta", "dtheta"]
     assert response.outputs[0, -1] == pytest.approx(float(run.at([5.0]).x[0]), abs=1e-12)
-    assert list(response.output_labels) == ["x", "dx", "theta", "dtheta"]
-    with pytest.raises(InputError, match="samples = 1"):
-        time_response(run, 1)
+    assert response.plot() is not None
 
 
 def test_a_delay_system_keeps_its_names():

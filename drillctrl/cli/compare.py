@@ -1,0 +1,136 @@
+"""`drillctrl compare`."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.output import check_folder, json_text, writing
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.comparison.comparing import Comparison, Given, Progress
+
+ENDINGS = (".html", ".csv", ".json")
+
+
+@click.command(name="compare")
+@point_options
+@click.option(
+    "--structures", default="p,case1,pd,case2", show_default=True, help="Presets to design for."
+)
+@click.option(
+    "--given",
+    multiple=True,
+    metavar="NAME=STRUCTURE:K1:K2",
+    help="Gains from elsewhere, such as paper=case2:-5.03,-4.91:-1.67,-0.31; may be repeated.",
+)
+@click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
+@click.option("--initial", default="dx=1,dtheta=1", show_default=True, help="Disturbance at t = 0.")
+@click.option("--duration", type=float, default=200.0, show_default=True, help="Of simulations.")
+@click.option("--sort", default="spectral_abscissa", show_default=True, help="Measure to sort by.")
+@click.option("--no-charts", is_flag=True, help="Leave out the stable areas.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--out", metavar="FILE", help="Write a report: .html, .csv or .json.")
+def compare_command(
+    structures: str,
+    given: tuple[str, ...],
+    bound: tuple[str, ...],
+    initial: str,
+    duration: float,
+    sort: str,
+    no_charts: bool,
+    as_json: bool,
+    out: str | None,
+    **point: Any,
+) -> None:
+    """Compare feedback structures and given gains at one point on one set of measures.
+
+    \b
+    Examples:
+      drillctrl compare --omega0 10 --delta0 12 --structures p,case1,case2 --out report.html
+      drillctrl compare --given "paper=case1:-5.17:5.06" --sort stability_radius
+      drillctrl compare --rig table1 --speed "150 rpm" --rop "20 m/h"
+    """
+    check_folder("--out", out)
+    if out is not None and Path(out).suffix.lower() not in ENDINGS:
+        raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
+    where, names = read_point(point), [name.strip() for name in structures.split(",")]
+    candidates = [read_given(text) for text in given]
+    from drillctrl.cli.simulate import read_initial
+    from drillctrl.comparison.comparing import REGION, compare
+
+    with _progress() as progress:
+        result = compare(
+            where,
+            [name for name in names if name],
+            given=candidates,
+            bounds=read_bounds(bound),
+            disturbance=read_initial(initial),
+            duration=duration,
+            region=None if no_charts else REGION,
+            sort=sort,
+            progress=progress,
+        )
+    if out is not None:
+        _write(result, out)
+    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+
+
+def read_given(text: str) -> Given:
+    """Return label, structure and gains from a text such as ``paper=case1:-5.17:5.06``.
+
+    Raises
+    ------
+    InputError
+        If the text has not that form.
+    """
+    label, equals, rest = text.partition("=")
+    parts = rest.split(":")
+    if not equals or not label.strip() or len(parts) not in (2, 3):
+        raise InputError("--given", text, "of the form NAME=STRUCTURE:K1:K2")
+    gains: list[list[float] | None] = []
+    for part in parts[1:]:
+        try:
+            gains.append([float(value) for value in part.split(",")])
+        except ValueError:
+            raise InputError("--given", text, "with gains that are numbers") from None
+    now, past = (*gains, None)[:2]
+    assert now is not None
+    return label.strip(), parts[0].strip(), now, past
+
+
+def _write(result: Comparison, out: str) -> None:
+    from drillctrl.files import write_text
+
+    ending = Path(out).suffix.lower()
+    if ending == ".html":
+        text = result.to_html()
+    elif ending == ".csv":
+        text = result.to_csv()
+    else:
+        text = json_text(result.to_dict()) + "\n"
+    writing("--out", out, lambda: write_text(out, text))
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """Yield what says on a terminal what is being done."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+
+    def show(what: str, done: int, total: int) -> None:
+        click.echo(f"\r\x1b[K{done}/{total} {what}", nl=False, err=True)
+
+    try:
+        yield show
+    finally:
+        click.echo("\r\x1b[K", nl=False, err=True)

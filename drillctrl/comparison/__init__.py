@@ -1,0 +1,1 @@
+"""Feedback structures side by side on one set of measures."""
