@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.design_result import Design
@@ -74,6 +75,7 @@ _HOME = {
     "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
+    "StabilisableChart": "charts.stabilisable",
     "StabilityChart": "charts.stability_chart",
     "SteadyState": "steady_state",
     "Tie": "feedback",
@@ -109,6 +111,7 @@ _HOME = {
     "simulate": "simulation",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
+    "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "steady_state": "steady_state",
     "table1": "rig",
@@ -148,6 +151,7 @@ __all__ = [
     "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
+    "StabilisableChart",
     "StabilityChart",
     "SteadyState",
     "Tie",
@@ -183,6 +187,7 @@ __all__ = [
     "simulate",
     "spectral_abscissa",
     "spectral_abscissas",
+    "stabilisable_chart",
     "stability_radius",
     "steady_state",
     "table1",

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from drillctrl.charts.plane import Plane
+    from drillctrl.charts.stabilisable import StabilisableChart
     from drillctrl.charts.stability_chart import StabilityChart
     from drillctrl.spectrum.characteristic import FloatArray
 
@@ -182,12 +183,14 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
             )
 
 
-def plot_charts(charts: Mapping[str, StabilityChart], ax: Axes | None = None) -> Axes:
+def plot_charts(
+    charts: Mapping[str, StabilityChart | StabilisableChart], ax: Axes | None = None
+) -> Axes:
     """Compare charts over the same axes: structures, rocks, dampings or decay rates.
 
     Parameters
     ----------
-    charts : mapping of str to StabilityChart
+    charts : mapping of str to StabilityChart or StabilisableChart
         By the label in the legend; all over the same two parameters.
     ax : Axes, optional
         By default new ones.
