@@ -18,14 +18,15 @@ from drillctrl.errors import InputError
 from drillctrl.optimisation.family import LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 
-_FREQUENCIES = 2500
-_SPACING = 0.015
+_FREQUENCIES = 1500
+_SPACING = 0.06
 _ROUNDS = 12
 _MOST = 8000
-_MINIMA = 12
-_REFINEMENTS = 16
+_GAPS = 60
+_REFINEMENTS = 20
 # Margins beyond this need no more digits: they do not lie near an edge.
 _CLEAR = 0.1
+_FLAT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,18 +126,7 @@ def _lowest(family: LoopFamily, piece: _Piece, line: float) -> tuple[float, floa
         lowest = margin.min(initial=np.inf)
         if not np.isfinite(lowest) or lowest < -_CLEAR:
             break
-        padded = np.concatenate([[np.inf], margin, [np.inf]])
-        minima = np.flatnonzero(
-            np.isfinite(margin) & (margin <= padded[:-2]) & (margin <= padded[2:])
-        )
-        minima = minima[np.argsort(margin[minima], kind="stable")[:_MINIMA]]
-        # A minimum much above the lowest, compared with the steps beside it, stays above.
-        beside = np.stack([padded[minima], padded[minima + 2]])
-        rise = np.where(np.isfinite(beside), beside - margin[minima], _CLEAR).max(axis=0)
-        minima = minima[margin[minima] - 2.0 * rise <= min(lowest, 1e-9)]
-        gaps = np.unique(np.concatenate([minima - 1, minima]))
-        gaps = gaps[(gaps >= 0) & (gaps < at.size - 1)]
-        gaps = gaps[at[gaps + 1] - at[gaps] > 1e-11 * (1.0 + np.abs(at[gaps]))]
+        gaps = _promising(at, margin, min(float(lowest), 0.0))
         if gaps.size == 0:
             break
         new = 0.5 * (at[gaps] + at[gaps + 1])
@@ -149,6 +139,21 @@ def _lowest(family: LoopFamily, piece: _Piece, line: float) -> tuple[float, floa
         return np.inf, float("nan"), np.full(family.feedback.lower.size, np.nan)
     i = int(margin.argmin())
     return float(margin[i]), float(at[i]), gains[i]
+
+
+def _promising(at: FloatArray, margin: FloatArray, target: float) -> np.ndarray:
+    """Return the gaps between places in which the margin may fall below a target."""
+    low, high = np.minimum(margin[1:], margin[:-1]), np.maximum(margin[1:], margin[:-1])
+    with np.errstate(invalid="ignore"):
+        step = np.where(np.isfinite(high), high - low, _CLEAR)
+    # What the margin does next to a gap it may do within it.
+    padded = np.concatenate([[0.0], step, [0.0]])
+    reach = np.maximum(step, np.maximum(padded[:-2], padded[2:]))
+    with np.errstate(invalid="ignore"):
+        bound = low - reach
+    wide = np.diff(at) > 1e-11 * (1.0 + np.abs(at[1:]))
+    gaps = np.flatnonzero(np.isfinite(low) & (bound < target) & (reach > _FLAT) & wide)
+    return np.sort(gaps[np.argsort(bound[gaps], kind="stable")[:_GAPS]])
 
 
 def _next_roots(family: LoopFamily, gains: FloatArray, held: ComplexArray) -> FloatArray:
@@ -174,7 +179,8 @@ def _grid(family: LoopFamily, line: float) -> FloatArray:
 
 def _affine(family: LoopFamily, line: float, omega: FloatArray) -> tuple[ComplexArray, ...]:
     s = np.asarray(line + 1j * omega, dtype=complex)
-    return family.determinant(s, np.zeros(family.feedback.lower.size))
+    value, slope = family.taylor(s, np.zeros(family.feedback.lower.size), 1)
+    return value[:, 0], slope[:, 0]
 
 
 def _isolated(family: LoopFamily, line: float) -> list[_Piece]:
