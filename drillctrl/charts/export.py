@@ -145,7 +145,7 @@ def stabilisable_summary(chart: StabilisableChart) -> str:
     if chart.undecided_area > 0.0:
         lines.append(
             f"  undecided {chart.undecided_area:.4g} at the lowest rotary speeds, where the delay "
-            "exceeds 3.2"
+            "exceeds 2.1"
         )
     lines.append(
         f"  sampled   {len(chart.lines)} lines, {chart.samples} places each before refinement; "

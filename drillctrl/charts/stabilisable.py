@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     from drillctrl.charts.stability_chart import StabilityChart
 
-_NARROWEST = 1e-3
+_NARROWEST = 3e-3
 # Roots of loops with longer delays crowd the axis, and gains that tame them are not looked for.
-_LONGEST_DELAY = 3.2
+_LONGEST_DELAY = 2.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class StabilisableChart:
         In units of x times y, and an estimate of the error that lines, crossings and
         panels leave; islands that no sample met are not in it.
     undecided_area : float
-        Of the strip at low rotary speed that is not looked at: there the delay exceeds 3.2.
+        Of the strip at low rotary speed that is not looked at: there the delay exceeds 2.1.
     lines : tuple of ScanLine
         The scanned lines of constant x.
     open_loop : StabilityChart
@@ -188,6 +188,7 @@ def stabilisable_chart(
         tolerance=tolerance,
         first=first_lines,
         narrowest=_NARROWEST,
+        inset=0.0,
     )
     # Every line carries two crossings or so, each within the tolerance of its root finder.
     most = max((line.at.size for line in result.lines), default=0)

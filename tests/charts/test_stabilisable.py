@@ -84,7 +84,7 @@ def test_chart_holds_the_open_loop_and_a_wider_box_holds_a_narrower_one():
 
 def test_low_speeds_are_said_to_be_undecided():
     drawn = stabilisable_chart(POINT, ("omega0", 0.0, 4.0), ("delta0", 0.0, 1.0), "p", **QUICK)
-    assert drawn.undecided_area == pytest.approx(2.0 * np.pi / (4 * 3.2))
+    assert drawn.undecided_area == pytest.approx(2.0 * np.pi / (4 * 2.1))
     assert "undecided" in drawn.summary()
 
 
