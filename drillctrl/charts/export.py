@@ -47,6 +47,7 @@ def chart_fields(chart: StabilityChart) -> dict[str, Any]:
         "level": chart.level,
         "stable_area": chart.stable_area,
         "stable_area_error": chart.area_error,
+        "undecided_area": chart.undecided_area,
         "boundaries": [curve.points.tolist() for curve in chart.curves],
         "boundary_details": [curve_fields(curve) for curve in chart.curves],
         "regions": [dataclasses.asdict(region) for region in chart.regions],
@@ -74,6 +75,10 @@ def chart_summary(chart: StabilityChart) -> str:
     ]
     if chart.level:
         lines.append(f"  meaning   all roots left of {chart.level:g}")
+    if chart.undecided_area > 0.0:
+        lines.append(
+            f"  undecided {chart.undecided_area:.4g} at the lowest rotary speeds, within the error"
+        )
     frequencies = [curve.omega for curve in chart.curves]
     if frequencies:
         omega = np.concatenate(frequencies)

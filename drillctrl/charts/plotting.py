@@ -204,5 +204,13 @@ def plot_charts(
         draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.4g})", style)
     if charts:
         label_axes(ax, next(iter(charts.values())).plane)
-    ax.legend(loc="best", fontsize="small", title="stable inside the shading")
+    # Beside the axes: shaded sets leave no free corner. A twin axis needs its room first.
+    rig = any(chart.plane.rig_point is not None for chart in charts.values())
+    ax.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.16 if rig else 1.01, 1.0),
+        fontsize="small",
+        title="stable inside the shading",
+        title_fontsize="small",
+    )
     return ax
