@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
     from drillctrl.spectrum.sensitivity import root_sensitivity
     from drillctrl.steady_state import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.tables.files import load_table, save_table
+    from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
+    from drillctrl.tables.table import GainTable, table
     from drillctrl.transfer import (
         frequency_response,
         loop_frd,
@@ -56,12 +59,15 @@ if TYPE_CHECKING:
     )
 
 _HOME = {
+    "Axis": "tables.grid",
     "Change": "simulation",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
     "Design": "design_result",
     "Exact": "optimisation.objectives",
     "FeedbackStructure": "feedback",
+    "GainTable": "tables.table",
+    "Grid": "tables.grid",
     "InputError": "errors",
     "LoopAnalysis": "analysis",
     "OperatingPoint": "operating_point",
@@ -90,11 +96,14 @@ _HOME = {
     "delay_margin": "robustness.margins",
     "design": "designing",
     "dimensional_plant": "plant",
+    "dimensionless_grid": "tables.grid",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
     "frequency_response": "transfer",
     "intervals_for": "spectrum.comparison",
+    "linear_axis": "tables.grid",
     "load_rig": "rig",
+    "load_table": "tables.files",
     "loop_frd": "transfer",
     "loop_transfer": "transfer",
     "parameter_margin": "robustness.margins",
@@ -104,9 +113,11 @@ _HOME = {
     "prove_count": "spectrum.proof",
     "pseudospectral_abscissa": "robustness.radius",
     "real_stability_radius": "robustness.radius",
+    "rig_grid": "tables.grid",
     "rig_point_at_weight_on_bit": "steady_state",
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
+    "save_table": "tables.files",
     "semidiscretize": "spectrum.semidiscretization",
     "simulate": "simulation",
     "spectral_abscissa": "spectrum.roots",
@@ -114,6 +125,7 @@ _HOME = {
     "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "steady_state": "steady_state",
+    "table": "tables.table",
     "table1": "rig",
     "to_frd": "transfer",
 }
@@ -132,12 +144,15 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Axis",
     "Change",
     "Controller",
     "DelaySystem",
     "Design",
     "Exact",
     "FeedbackStructure",
+    "GainTable",
+    "Grid",
     "InputError",
     "LoopAnalysis",
     "OperatingPoint",
@@ -166,11 +181,14 @@ __all__ = [
     "delay_margin",
     "design",
     "dimensional_plant",
+    "dimensionless_grid",
     "dimensionless_plant",
     "dominant_roots",
     "frequency_response",
     "intervals_for",
+    "linear_axis",
     "load_rig",
+    "load_table",
     "loop_frd",
     "loop_transfer",
     "parameter_margin",
@@ -180,9 +198,11 @@ __all__ = [
     "prove_count",
     "pseudospectral_abscissa",
     "real_stability_radius",
+    "rig_grid",
     "rig_point_at_weight_on_bit",
     "root_sensitivity",
     "save_rig",
+    "save_table",
     "semidiscretize",
     "simulate",
     "spectral_abscissa",
@@ -190,6 +210,7 @@ __all__ = [
     "stabilisable_chart",
     "stability_radius",
     "steady_state",
+    "table",
     "table1",
     "to_frd",
 ]

@@ -13,8 +13,9 @@ from drillctrl.analysis import (
     DEFAULT_ORDER,
     Fragility,
     LoopAnalysis,
+    SpectralRadius,
     analyze_loop,
-    analyze_roots,
+    discretised_radius,
     fragility,
     perturbed_plants,
 )
@@ -71,6 +72,10 @@ class Design:
         Gains on Y(t) and on Y(t − τ0).
     loop : LoopAnalysis
         With the feedback.
+    m : int or None
+        Intervals of the semi-discretisation that is reported; None: chosen to suit.
+    order : int
+        Its order.
     objective : Objective or None
         What the gains minimise; None for given gains.
     objective_value : float or None
@@ -95,6 +100,8 @@ class Design:
     K1: FloatArray
     K2: FloatArray
     loop: LoopAnalysis
+    m: int | None = None
+    order: int = DEFAULT_ORDER
     objective: Objective | None = None
     objective_value: float | None = None
     requirements: Requirements = NO_REQUIREMENTS
@@ -119,9 +126,14 @@ class Design:
         return isinstance(self.objective, Exact) and not self.requirements
 
     @functools.cached_property
+    def spectral_radius(self) -> SpectralRadius | None:
+        """ρ(D) of the semi-discretised loop; None without delay."""
+        return discretised_radius(self.system(), self.m, self.order)
+
+    @functools.cached_property
     def open_loop(self) -> LoopAnalysis:
         """Without the feedback."""
-        return self.loop if self.structure is None else analyze_roots(self.plant)
+        return self.loop if self.structure is None else analyze_loop(self.plant)
 
     @functools.cached_property
     def fragility(self) -> Fragility | None:
@@ -255,6 +267,6 @@ def assess(
 ) -> Design:
     """Analyse the loop that the gains close, beside the open loop."""
     plant = subject.plant
-    loop = analyze_loop(closed_loop(plant, feedback, K1, K2), m, order)
+    loop = analyze_loop(closed_loop(plant, feedback, K1, K2))
     where = subject.point, subject.rig_point, subject.physics
-    return Design(plant, *where, feedback, K1, K2, loop)
+    return Design(plant, *where, feedback, K1, K2, loop, m, order)

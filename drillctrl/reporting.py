@@ -125,7 +125,7 @@ def _verdict_lines(design: Design) -> _Lines:
     counted = "undecided" if check.counted is None else str(check.counted)
     right = f"{counted} root(s) right of {check.line:.4g}, {check.found} found"
     lines.append(("Checked by", f"argument principle {word}: {right}"))
-    radius = loop.spectral_radius
+    radius = design.spectral_radius
     if radius is not None:
         lines.append(
             (

@@ -68,23 +68,29 @@ def hypotheses(values: ComplexArray, gains: int, width: float) -> list[tuple[Act
         How far from each other values may be to stand for one multiple root.
     """
     top = values[0].real
-    upper = [s for s in values if s.imag >= 0 and s.real > top - width]
+    upper = [complex(s) for s in values if s.imag >= 0 and s.real > top - width]
+    # A pair as close to the real axis as that may become a real root, or stay a pair.
+    configurations = [_configuration(upper, gains, width, axis) for axis in (width, 0.3 * width)]
+    return [found for found in dict.fromkeys(configurations) if found]
+
+
+def _configuration(
+    upper: list[complex], gains: int, width: float, axis: float
+) -> tuple[ActiveRoot, ...]:
+    """Group values within ``width`` of each other; pairs within ``axis`` of the axis are real."""
     groups: list[list[complex]] = []
     for s in upper:
-        # A pair close to the real axis is about to become a real root of multiplicity two.
-        members = [complex(s)] if s.imag == 0 else [complex(s), complex(s).conjugate()]
-        near_axis = abs(s.imag) < width
+        near_axis = abs(s.imag) < axis
         home = next(
             (
                 g
                 for g in groups
                 if min(abs(s - z) for z in g) < width
-                and (near_axis == any(abs(z.imag) < width for z in g))
+                and near_axis == any(abs(z.imag) < axis for z in g)
             ),
             None,
         )
-        if not near_axis:
-            members = [complex(s)]
+        members = [s, s.conjugate()] if near_axis and s.imag > 0.0 else [s]
         if home is None:
             groups.append(members)
         else:
@@ -93,7 +99,7 @@ def hypotheses(values: ComplexArray, gains: int, width: float) -> list[tuple[Act
     budget = gains + 1
     for group in groups:
         omega = float(np.mean([z.imag for z in group]))
-        real = abs(omega) < 1e-9 or any(abs(z.imag) < width for z in group)
+        real = abs(omega) < 1e-9 or any(abs(z.imag) < axis for z in group)
         root = ActiveRoot(0.0 if real else omega, len(group))
         cost = root.equations - (0 if real else 1)
         if cost > budget:
@@ -105,7 +111,7 @@ def hypotheses(values: ComplexArray, gains: int, width: float) -> list[tuple[Act
         budget -= cost
         if budget == 0:
             break
-    return [tuple(found)] if found else []
+    return tuple(found)
 
 
 def sharpen(
