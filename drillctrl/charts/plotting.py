@@ -201,16 +201,20 @@ def plot_charts(
         colour, style = palette[rank % len(palette)], STYLES[rank % len(STYLES)]
         strips = stable_strips(chart.lines, rows=chart.rows)
         draw_strips(ax, strips, colour, "_nolegend_", alpha=0.10)
-        draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.4g})", style)
+        draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.5g})", style)
     if charts:
         label_axes(ax, next(iter(charts.values())).plane)
-    # Beside the axes: shaded sets leave no free corner. A twin axis needs its room first.
-    rig = any(chart.plane.rig_point is not None for chart in charts.values())
+    # Above the axes: shaded sets leave no free corner. A twin axis needs its room first.
+    twin = any(
+        chart.plane.rig_point is not None and chart.plane.x.name == "omega0"
+        for chart in charts.values()
+    )
     ax.legend(
-        loc="upper left",
-        bbox_to_anchor=(1.16 if rig else 1.01, 1.0),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.15 if twin else 1.01),
         fontsize="small",
         title="stable inside the shading",
         title_fontsize="small",
+        frameon=False,
     )
     return ax
