@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from drillctrl.designing import analyze, design
     from drillctrl.errors import InputError
     from drillctrl.feedback import FeedbackStructure, Tie, close_loop, preset_structure
+    from drillctrl.instrumentation import with_actuator_lag, with_filter
+    from drillctrl.interop.controllers import controller_system, scheduled_controller
+    from drillctrl.interop.lifted import lifted_system, pade_approximation
+    from drillctrl.interop.plants import from_control
+    from drillctrl.interop.responses import time_response
     from drillctrl.operating_point import OperatingPoint, RigPoint
     from drillctrl.optimisation.objectives import (
         Exact,
@@ -51,12 +56,8 @@ if TYPE_CHECKING:
     from drillctrl.tables.files import load_table, save_table
     from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
     from drillctrl.tables.table import GainTable, table
-    from drillctrl.transfer import (
-        frequency_response,
-        loop_frd,
-        loop_transfer,
-        to_frd,
-    )
+    from drillctrl.top_drive import soft_torque, top_drive_plant
+    from drillctrl.transfer import frequency_response, loop_frd, loop_transfer, to_frd
 
 _HOME = {
     "Axis": "tables.grid",
@@ -88,10 +89,11 @@ _HOME = {
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
-    "chart": "charts.stability_chart",
     "characteristic_roots": "spectrum.roots",
+    "chart": "charts.stability_chart",
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
+    "controller_system": "interop.controllers",
     "count_right_of": "spectrum.count",
     "delay_margin": "robustness.margins",
     "design": "designing",
@@ -100,12 +102,15 @@ _HOME = {
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
     "frequency_response": "transfer",
+    "from_control": "interop.plants",
     "intervals_for": "spectrum.comparison",
+    "lifted_system": "interop.lifted",
     "linear_axis": "tables.grid",
     "load_rig": "rig",
     "load_table": "tables.files",
     "loop_frd": "transfer",
     "loop_transfer": "transfer",
+    "pade_approximation": "interop.lifted",
     "parameter_margin": "robustness.margins",
     "plant_system": "delay_system",
     "point_margins": "robustness.margins",
@@ -118,8 +123,10 @@ _HOME = {
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
     "save_table": "tables.files",
+    "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
     "simulate": "simulation",
+    "soft_torque": "top_drive",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
     "stabilisable_chart": "charts.stabilisable",
@@ -127,7 +134,11 @@ _HOME = {
     "steady_state": "steady_state",
     "table": "tables.table",
     "table1": "rig",
+    "time_response": "interop.responses",
     "to_frd": "transfer",
+    "top_drive_plant": "top_drive",
+    "with_actuator_lag": "instrumentation",
+    "with_filter": "instrumentation",
 }
 
 
@@ -177,6 +188,7 @@ __all__ = [
     "chart",
     "close_loop",
     "compare_spectra",
+    "controller_system",
     "count_right_of",
     "delay_margin",
     "design",
@@ -185,12 +197,15 @@ __all__ = [
     "dimensionless_plant",
     "dominant_roots",
     "frequency_response",
+    "from_control",
     "intervals_for",
+    "lifted_system",
     "linear_axis",
     "load_rig",
     "load_table",
     "loop_frd",
     "loop_transfer",
+    "pade_approximation",
     "parameter_margin",
     "plant_system",
     "point_margins",
@@ -203,8 +218,10 @@ __all__ = [
     "root_sensitivity",
     "save_rig",
     "save_table",
+    "scheduled_controller",
     "semidiscretize",
     "simulate",
+    "soft_torque",
     "spectral_abscissa",
     "spectral_abscissas",
     "stabilisable_chart",
@@ -212,5 +229,9 @@ __all__ = [
     "steady_state",
     "table",
     "table1",
+    "time_response",
     "to_frd",
+    "top_drive_plant",
+    "with_actuator_lag",
+    "with_filter",
 ]
