@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.comparison.comparing import Comparison, compare
     from drillctrl.delay_system import DelaySystem, plant_system
@@ -82,6 +83,7 @@ _HOME = {
     "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
+    "StabilisableChart": "charts.stabilisable",
     "StabilityChart": "charts.stability_chart",
     "SteadyState": "steady_state",
     "Tie": "feedback",
@@ -129,6 +131,7 @@ _HOME = {
     "soft_torque": "top_drive",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
+    "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "steady_state": "steady_state",
     "table": "tables.table",
@@ -176,6 +179,7 @@ __all__ = [
     "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
+    "StabilisableChart",
     "StabilityChart",
     "SteadyState",
     "Tie",
@@ -223,6 +227,7 @@ __all__ = [
     "soft_torque",
     "spectral_abscissa",
     "spectral_abscissas",
+    "stabilisable_chart",
     "stability_radius",
     "steady_state",
     "table",

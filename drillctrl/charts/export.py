@@ -12,6 +12,7 @@ from drillctrl.charts.chains import Curve
 from drillctrl.charts.plane import Plane
 
 if TYPE_CHECKING:
+    from drillctrl.charts.stabilisable import StabilisableChart
     from drillctrl.charts.stability_chart import StabilityChart
 
 
@@ -46,6 +47,7 @@ def chart_fields(chart: StabilityChart) -> dict[str, Any]:
         "level": chart.level,
         "stable_area": chart.stable_area,
         "stable_area_error": chart.area_error,
+        "undecided_area": chart.undecided_area,
         "boundaries": [curve.points.tolist() for curve in chart.curves],
         "boundary_details": [curve_fields(curve) for curve in chart.curves],
         "regions": [dataclasses.asdict(region) for region in chart.regions],
@@ -73,6 +75,10 @@ def chart_summary(chart: StabilityChart) -> str:
     ]
     if chart.level:
         lines.append(f"  meaning   all roots left of {chart.level:g}")
+    if chart.undecided_area > 0.0:
+        lines.append(
+            f"  undecided {chart.undecided_area:.4g} at the lowest rotary speeds, within the error"
+        )
     frequencies = [curve.omega for curve in chart.curves]
     if frequencies:
         omega = np.concatenate(frequencies)
@@ -83,4 +89,71 @@ def chart_summary(chart: StabilityChart) -> str:
     checked = [region for region in chart.regions if region.confirmed is not None]
     agree = sum(bool(region.confirmed) for region in checked)
     lines.append(f"  checked   the argument principle agrees in {agree} of {len(checked)} regions")
+    return "\n".join(lines)
+
+
+def stabilisable_fields(chart: StabilisableChart) -> dict[str, Any]:
+    """Return the JSON fields of ``chart --optimise``."""
+    structure = chart.structure
+    return {
+        "schema": "drillctrl/chart/1",
+        **plane_fields(chart.plane),
+        "structure": structure.name,
+        "K1": None,
+        "K2": None,
+        "optimised": True,
+        "bounds": {
+            name: [low, high]
+            for name, low, high in zip(
+                structure.gain_names,
+                structure.lower.tolist(),
+                structure.upper.tolist(),
+                strict=True,
+            )
+        },
+        "level": chart.level,
+        "stable_area": chart.stable_area,
+        "stable_area_error": chart.area_error,
+        "undecided_area": chart.undecided_area,
+        "open_loop_area": chart.open_loop.stable_area,
+        "open_loop_area_error": chart.open_loop.area_error,
+        "area_ratio": chart.area_ratio,
+        "area_ratio_error": chart.area_ratio_error,
+        "boundaries": [curve.points.tolist() for curve in chart.curves],
+        "boundary_details": [curve_fields(curve) for curve in chart.curves],
+        "method": "gain curves",
+        "samples": chart.samples,
+        "elapsed_seconds": chart.elapsed_seconds,
+    }
+
+
+def stabilisable_summary(chart: StabilisableChart) -> str:
+    """Return a text for people."""
+    plane, structure = chart.plane, chart.structure
+    bounds = ", ".join(
+        f"{name} in [{low:g}, {high:g}]"
+        for name, low, high in zip(
+            structure.gain_names, structure.lower, structure.upper, strict=True
+        )
+    )
+    goal = "stabilise" if chart.level == 0.0 else f"put all roots left of {chart.level:g}"
+    lines = [
+        f"Where some gains of {structure.name} {goal}",
+        f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
+        f"{plane.y.label} in [{plane.y.low:g}, {plane.y.high:g}]",
+        f"  bounds    {bounds}",
+        f"  reached   {area_text(chart.stable_area, chart.area_error, plane)}",
+        f"  open loop {area_text(chart.open_loop.stable_area, chart.open_loop.area_error, plane)}",
+    ]
+    if chart.area_ratio is not None and chart.area_ratio_error is not None:
+        lines.append(f"  ratio     {chart.area_ratio:.4g} ± {chart.area_ratio_error:.1g}")
+    if chart.undecided_area > 0.0:
+        lines.append(
+            f"  undecided {chart.undecided_area:.4g} at the lowest rotary speeds, where the delay "
+            "exceeds 2.1"
+        )
+    lines.append(
+        f"  sampled   {len(chart.lines)} lines, {chart.samples} places each before refinement; "
+        "smaller islands may be missed"
+    )
     return "\n".join(lines)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from drillctrl.charts.plane import Plane
+    from drillctrl.charts.stabilisable import StabilisableChart
     from drillctrl.charts.stability_chart import StabilityChart
     from drillctrl.spectrum.characteristic import FloatArray
 
@@ -182,12 +183,14 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
             )
 
 
-def plot_charts(charts: Mapping[str, StabilityChart], ax: Axes | None = None) -> Axes:
+def plot_charts(
+    charts: Mapping[str, StabilityChart | StabilisableChart], ax: Axes | None = None
+) -> Axes:
     """Compare charts over the same axes: structures, rocks, dampings or decay rates.
 
     Parameters
     ----------
-    charts : mapping of str to StabilityChart
+    charts : mapping of str to StabilityChart or StabilisableChart
         By the label in the legend; all over the same two parameters.
     ax : Axes, optional
         By default new ones.
@@ -198,8 +201,20 @@ def plot_charts(charts: Mapping[str, StabilityChart], ax: Axes | None = None) ->
         colour, style = palette[rank % len(palette)], STYLES[rank % len(STYLES)]
         strips = stable_strips(chart.lines, rows=chart.rows)
         draw_strips(ax, strips, colour, "_nolegend_", alpha=0.10)
-        draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.4g})", style)
+        draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.5g})", style)
     if charts:
         label_axes(ax, next(iter(charts.values())).plane)
-    ax.legend(loc="best", fontsize="small", title="stable inside the shading")
+    # Above the axes: shaded sets leave no free corner. A twin axis needs its room first.
+    twin = any(
+        chart.plane.rig_point is not None and chart.plane.x.name == "omega0"
+        for chart in charts.values()
+    )
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.15 if twin else 1.01),
+        fontsize="small",
+        title="stable inside the shading",
+        title_fontsize="small",
+        frameon=False,
+    )
     return ax

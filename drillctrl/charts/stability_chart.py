@@ -52,7 +52,9 @@ class StabilityChart:
     regions : tuple of Region
         Parts with the same number of roots right of the line, the largest first.
     stable_area, area_error : float
-        In units of x times y, and an estimated bound of the error.
+        In units of x times y, and an estimated bound of the error, ``undecided_area`` included.
+    undecided_area : float
+        Of the strip at the lowest rotary speeds in which no line lies.
     lines : tuple of ScanLine
         All lines that were scanned.
     rows : bool
@@ -68,6 +70,7 @@ class StabilityChart:
     regions: tuple[Region, ...]
     stable_area: float
     area_error: float
+    undecided_area: float
     lines: tuple[ScanLine, ...]
     rows: bool
     elapsed_seconds: float
@@ -272,6 +275,8 @@ def chart(
     regions = label_regions(plane, result.lines, level, rows=rows)
     # Nothing is known of the strip that holds no line.
     unseen = (start - held.low) * scanned.span
+    if method == "counting":
+        unseen += (first_position(scanned) - scanned.low) * held.span
     return StabilityChart(
         plane,
         level,
@@ -280,6 +285,7 @@ def chart(
         regions,
         result.area,
         result.area_error + unseen,
+        unseen,
         result.lines,
         rows,
         time.perf_counter() - began,

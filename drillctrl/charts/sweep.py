@@ -17,6 +17,7 @@ from drillctrl.charts.scan import ScanLine, Scanner
 _FIRST_LINES = 97
 _NARROWEST = 2e-5
 _ROUNDS = 18
+_INSET = 1e-6
 _MOST_LINES = 3000
 
 
@@ -72,6 +73,7 @@ def sweep(
     tolerance: float = 2e-4,
     first: int = _FIRST_LINES,
     narrowest: float = _NARROWEST,
+    inset: float = _INSET,
 ) -> Sweep:
     """Place lines between two positions until the stable area is known.
 
@@ -87,12 +89,14 @@ def sweep(
         Lines to begin with.
     narrowest : float
         Smallest panel, as a share of the range.
+    inset : float
+        How far inside the ends two more lines lie, as a share of the range.
     """
     span = high - low
     # An even grid, with lines a hair inside its ends: there, a boundary may coincide
     # with the edge of the chart.
     positions = np.linspace(low, high, first)
-    positions = np.unique(np.concatenate([positions, [low + 1e-6 * span, high - 1e-6 * span]]))
+    positions = np.unique(np.concatenate([positions, [low + inset * span, high - inset * span]]))
     lines = {float(t): line for t, line in zip(positions, scanner(positions), strict=True)}
     order = sorted(lines)
     panels = list(itertools.pairwise(order))

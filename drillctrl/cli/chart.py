@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from drillctrl.cli.gains import read_gains
+from drillctrl.cli.gains import read_bounds, read_gains
 from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.charts.stabilisable import StabilisableChart
+    from drillctrl.charts.stability_chart import StabilityChart
+    from drillctrl.operating_point import OperatingPoint, RigPoint
 
 
 def read_axis(option: str, text: str) -> tuple[str, object, object]:
@@ -46,6 +52,17 @@ def read_axis(option: str, text: str) -> tuple[str, object, object]:
 @click.option(
     "--level", type=float, default=0.0, help="Ask for all roots left of this instead of 0."
 )
+@click.option(
+    "--optimise",
+    is_flag=True,
+    help="Draw where some gains of --structure within the bounds stabilise.",
+)
+@click.option(
+    "--bound",
+    multiple=True,
+    metavar="GAIN=LOW:HIGH",
+    help="With --optimise: for K1, K2 or one gain such as K1_2; may be repeated.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--out", metavar="FILE.json", help="Also write that object to a file.")
 @click.option("--plot", metavar="FILE", help="Draw the chart (.png, .svg or .pdf).")
@@ -56,6 +73,8 @@ def chart_command(
     k1: str | None,
     k2: str | None,
     level: float,
+    optimise: bool,
+    bound: tuple[str, ...],
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -73,15 +92,22 @@ def chart_command(
       drillctrl chart --x K1_1=-10:10 --y K2_1=-10:10 --structure case1
       drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
           --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 -2
+      drillctrl chart --optimise --structure case1 --x omega0=0:25 --y delta0=0:18
     """
     check_json(out)
     check_figure(plot)
     where = read_point(point)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
     gains = read_gains("K1", k1), read_gains("K2", k2)
-    from drillctrl.charts.stability_chart import chart
+    result: StabilityChart | StabilisableChart
+    if optimise:
+        result = _optimised(where, x, y, structure, gains, level, bound)
+    else:
+        if bound:
+            raise InputError("--bound", bound[0], "given only with --optimise")
+        from drillctrl.charts.stability_chart import chart
 
-    result = chart(where, x, y, structure, *gains, level=level)
+        result = chart(where, x, y, structure, *gains, level=level)
     fields = result.to_dict()
     if out is not None:
         write_json(out, fields)
@@ -90,3 +116,33 @@ def chart_command(
         assert figure is not None
         write_figure(plot, figure)
     click.echo(json_text(fields) if as_json else result.summary())
+
+
+def _optimised(
+    where: OperatingPoint | RigPoint,
+    x: tuple[str, object, object],
+    y: tuple[str, object, object],
+    structure: str | None,
+    gains: tuple[list[float] | None, ...],
+    level: float,
+    bound: tuple[str, ...],
+) -> StabilisableChart:
+    from drillctrl.charts.stabilisable import stabilisable_chart
+    from drillctrl.feedback import preset_structure
+
+    for name, given in zip(("--K1", "--K2"), gains, strict=True):
+        if given is not None:
+            raise InputError(name, str(given), "left out with --optimise")
+    if structure is None:
+        raise InputError("--structure", "(missing)", "given with --optimise")
+    chosen = preset_structure(structure).with_bounds(read_bounds(bound))
+    result = stabilisable_chart(where, x, y, chosen, level=level, progress=_show_progress)
+    if sys.stderr.isatty():
+        click.echo(err=True)
+    return result
+
+
+def _show_progress(done: int) -> None:
+    """Say how far long work is, where a person watches."""
+    if sys.stderr.isatty():
+        click.echo(f"\rlines done: {done}", nl=False, err=True)

@@ -253,3 +253,18 @@ def test_bad_input_is_named(x, y, structure, gains, parameter):
     with pytest.raises(InputError) as error:
         chart(POINT, x, y, structure, *gains)
     assert error.value.parameter == parameter
+
+
+@pytest.mark.parametrize(
+    ("axes", "level", "strip"),
+    [
+        ((("omega0", 0.0, 20.0), ("delta0", 0.0, 2.0)), 0.0, 0.0),
+        ((("omega0", 0.0, 20.0), ("delta0", 0.0, 2.0)), -0.005, 0.02 * 2.0),
+        ((("delta0", 0.0, 2.0), ("omega0", 0.0, 20.0)), -0.005, 0.02 * 2.0),
+    ],
+)
+def test_strip_without_lines_is_part_of_the_error(axes, level, strip):
+    drawn = chart(POINT, *axes, level=level, tolerance=0.05)
+    assert drawn.undecided_area == pytest.approx(strip)
+    assert drawn.area_error >= drawn.undecided_area
+    assert ("undecided" in drawn.summary()) == (strip > 0.0)

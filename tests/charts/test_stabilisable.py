@@ -1,0 +1,134 @@
+"""What feedback can reach, against the search over gains and against sampled boxes."""
+
+import json
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    InputError,
+    OperatingPoint,
+    analyze,
+    chart,
+    design,
+    plant_system,
+    preset_structure,
+    stabilisable_chart,
+)
+from drillctrl.charts.gain_margin import gain_margin
+from drillctrl.charts.plotting import plot_charts
+from drillctrl.cli import main
+from drillctrl.optimisation.family import loop_family
+
+QUICK = {"first_lines": 3, "samples": 5, "tolerance": 1e-2}
+POINT = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)
+SPEEDS = ("omega0", 8.0, 12.0)
+
+
+def margin_at(point, name):
+    structure = preset_structure(name)
+    return gain_margin(loop_family(plant_system(point), structure)), structure
+
+
+@pytest.mark.parametrize("name", ["p", "case1", "pd"])
+def test_margin_agrees_with_the_search_over_gains(name):
+    rng = np.random.default_rng(2)
+    signs = []
+    for omega0, delta0 in zip(rng.uniform(3.0, 25.0, 6), rng.uniform(0.2, 17.0, 6), strict=True):
+        point = POINT.with_changes(omega0=omega0, delta0=delta0)
+        best = design(point, name).spectral_abscissa
+        if abs(best) > 1e-3:
+            assert (margin_at(point, name)[0].margin < 0.0) == (best < 0.0)
+            signs.append(best < 0.0)
+    assert signs
+
+
+def test_best_gains_hold_a_root_on_the_line():
+    found, _ = margin_at(POINT.with_changes(delta0=12.0), "case1")
+    held = analyze(POINT.with_changes(delta0=12.0), "case1", *([g] for g in found.gains))
+    assert held.spectral_abscissa == pytest.approx(0.0, abs=1e-9)
+    assert found.margin < 0.0
+    assert np.abs([root.imag for root in held.loop.dominant_roots]).max() == pytest.approx(
+        found.omega, abs=1e-6
+    )
+
+
+def test_line_where_p_ceases_to_help_follows_from_the_tangency():
+    drawn = stabilisable_chart(POINT, SPEEDS, ("delta0", 0.0, 15.0), "p", **QUICK)
+    tops = [line.at[-1] for line in drawn.lines]
+    assert max(tops) - min(tops) < 0.3
+    for line in drawn.lines[::2]:
+        top = line.at[-1]
+        here = POINT.with_changes(omega0=line.position, delta0=top - 0.01)
+        above = here.with_changes(delta0=top + 0.01)
+        gains = np.linspace(-10.0, 10.0, 4001)
+        for point, possible in ((here, True), (above, False)):
+            family = loop_family(plant_system(point), preset_structure("p"))
+            assert (family.abscissas(gains[:, None]).min() < 0.0) == possible
+
+
+def test_chart_holds_the_open_loop_and_a_wider_box_holds_a_narrower_one():
+    axes = SPEEDS, ("delta0", 0.0, 15.0)
+    narrow = preset_structure("case1").with_bounds({"K1": (-2.0, 2.0), "K2": (-0.2, 0.2)})
+    small = stabilisable_chart(POINT, *axes, narrow, **QUICK)
+    large = stabilisable_chart(POINT, *axes, "p", **QUICK)
+    assert small.open_loop.stable_area == pytest.approx(chart(POINT, *axes).stable_area)
+    assert small.stable_area > 3.0 * small.open_loop.stable_area
+    assert large.stable_area < small.stable_area
+    assert small.area_ratio == pytest.approx(small.stable_area / small.open_loop.stable_area)
+    drawn = plot_charts({"p": large, "narrow": small, "open": small.open_loop})
+    texts = [text.get_text() for text in drawn.get_legend().get_texts()]
+    assert len(texts) == 3
+    assert all("area" in text for text in texts)
+
+
+def test_low_speeds_are_said_to_be_undecided():
+    drawn = stabilisable_chart(POINT, ("omega0", 0.0, 4.0), ("delta0", 0.0, 1.0), "p", **QUICK)
+    assert drawn.undecided_area == pytest.approx(2.0 * np.pi / (4 * 2.1))
+    assert "undecided" in drawn.summary()
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [({"structure": "case2"}, "structure"), ({"samples": 1}, "samples"), ({"level": 1e9}, "level")],
+)
+def test_bad_input_is_named(options, named):
+    with pytest.raises(InputError, match=named):
+        stabilisable_chart(POINT, SPEEDS, ("delta0", 0.0, 15.0), **options)
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+def test_command_line(capsys, tmp_path):
+    figure = tmp_path / "reach.png"
+    status, out, err = run(
+        capsys,
+        *("chart", "--optimise", "--structure", "p", "--x", "omega0=8:12", "--y", "delta0=0:12"),
+        *("--bound", "K1=-3:0", "--json", "--plot", figure),
+    )
+    assert (status, err) == (0, "")
+    fields = json.loads(out)
+    assert fields["optimised"] is True
+    assert fields["bounds"] == {"K1_1": [-3.0, 0.0]}
+    assert fields["area_ratio"] == pytest.approx(fields["stable_area"] / fields["open_loop_area"])
+    assert figure.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--optimise",),
+        ("--optimise", "--structure", "p", "--K1", "-2"),
+        ("--optimise", "--structure", "case2"),
+        ("--bound", "K1=-1:1"),
+    ],
+)
+def test_command_line_refuses(capsys, arguments):
+    status, out, err = run(capsys, "chart", *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
