@@ -216,3 +216,12 @@ def test_public_names_are_all_there():
         assert getattr(drillctrl, name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'invented'"):
         drillctrl.invented  # noqa: B018
+
+
+def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("DRILLCTRL_CACHE", str(tmp_path))
+    for arguments in (["--rtol", "-1"], ["--initial", "dtheta=-20"], ["--model", "magic"]):
+        code, out, err = run(capsys, "simulate", "--delta0", 2.5, *arguments)
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+        assert "compiling" not in err
