@@ -61,7 +61,7 @@ def main(points: int) -> None:
     for i in range(points):
         point = centre.with_changes(**{key: float(v[i]) for key, v in varied.items()})
         system = close_loop(plant_system(point), case2, *case2.gains(gains[i]))
-        analysis = analyze_loop(system, m=1, order=0)
+        analysis = analyze_loop(system)
         wrong = abs(analysis.spectral_abscissa - alpha[i]) > 1e-9 + analysis.abscissa_error
         if not analysis.certificate.agrees or wrong:
             disagree += 1

@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from drillctrl.designing import analyze, design
     from drillctrl.errors import InputError
     from drillctrl.feedback import FeedbackStructure, Tie, close_loop, preset_structure
+    from drillctrl.instrumentation import with_actuator_lag, with_filter
+    from drillctrl.interop.controllers import controller_system, scheduled_controller
+    from drillctrl.interop.lifted import lifted_system, pade_approximation
+    from drillctrl.interop.plants import from_control
+    from drillctrl.interop.responses import time_response
     from drillctrl.operating_point import OperatingPoint, RigPoint
     from drillctrl.optimisation.objectives import (
         Exact,
@@ -27,9 +32,8 @@ if TYPE_CHECKING:
     )
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.rig import Rig, load_rig, save_rig, table1
-    from drillctrl.robustness import (
-        delay_margin,
-        parameter_margin,
+    from drillctrl.robustness.margins import delay_margin, parameter_margin, point_margins
+    from drillctrl.robustness.radius import (
         pseudospectral_abscissa,
         real_stability_radius,
         stability_radius,
@@ -48,20 +52,22 @@ if TYPE_CHECKING:
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
     from drillctrl.spectrum.sensitivity import root_sensitivity
     from drillctrl.steady_state import SteadyState, rig_point_at_weight_on_bit, steady_state
-    from drillctrl.transfer import (
-        frequency_response,
-        loop_frd,
-        loop_transfer,
-        to_frd,
-    )
+    from drillctrl.tables.files import load_table, save_table
+    from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
+    from drillctrl.tables.table import GainTable, table
+    from drillctrl.top_drive import soft_torque, top_drive_plant
+    from drillctrl.transfer import frequency_response, loop_frd, loop_transfer, to_frd
 
 _HOME = {
+    "Axis": "tables.grid",
     "Change": "simulation",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
     "Design": "design_result",
     "Exact": "optimisation.objectives",
     "FeedbackStructure": "feedback",
+    "GainTable": "tables.table",
+    "Grid": "tables.grid",
     "InputError": "errors",
     "LoopAnalysis": "analysis",
     "OperatingPoint": "operating_point",
@@ -81,38 +87,55 @@ _HOME = {
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
-    "chart": "charts.stability_chart",
     "characteristic_roots": "spectrum.roots",
+    "chart": "charts.stability_chart",
     "close_loop": "feedback",
     "compare_spectra": "spectrum.comparison",
+    "controller_system": "interop.controllers",
     "count_right_of": "spectrum.count",
-    "delay_margin": "robustness",
+    "delay_margin": "robustness.margins",
     "design": "designing",
     "dimensional_plant": "plant",
+    "dimensionless_grid": "tables.grid",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
     "frequency_response": "transfer",
+    "from_control": "interop.plants",
     "intervals_for": "spectrum.comparison",
+    "lifted_system": "interop.lifted",
+    "linear_axis": "tables.grid",
     "load_rig": "rig",
+    "load_table": "tables.files",
     "loop_frd": "transfer",
     "loop_transfer": "transfer",
-    "parameter_margin": "robustness",
+    "pade_approximation": "interop.lifted",
+    "parameter_margin": "robustness.margins",
     "plant_system": "delay_system",
+    "point_margins": "robustness.margins",
     "preset_structure": "feedback",
     "prove_count": "spectrum.proof",
-    "pseudospectral_abscissa": "robustness",
-    "real_stability_radius": "robustness",
+    "pseudospectral_abscissa": "robustness.radius",
+    "real_stability_radius": "robustness.radius",
+    "rig_grid": "tables.grid",
     "rig_point_at_weight_on_bit": "steady_state",
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
+    "save_table": "tables.files",
+    "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
     "simulate": "simulation",
+    "soft_torque": "top_drive",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
-    "stability_radius": "robustness",
+    "stability_radius": "robustness.radius",
     "steady_state": "steady_state",
+    "table": "tables.table",
     "table1": "rig",
+    "time_response": "interop.responses",
     "to_frd": "transfer",
+    "top_drive_plant": "top_drive",
+    "with_actuator_lag": "instrumentation",
+    "with_filter": "instrumentation",
 }
 
 
@@ -129,12 +152,15 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Axis",
     "Change",
     "Controller",
     "DelaySystem",
     "Design",
     "Exact",
     "FeedbackStructure",
+    "GainTable",
+    "Grid",
     "InputError",
     "LoopAnalysis",
     "OperatingPoint",
@@ -158,32 +184,49 @@ __all__ = [
     "chart",
     "close_loop",
     "compare_spectra",
+    "controller_system",
     "count_right_of",
     "delay_margin",
     "design",
     "dimensional_plant",
+    "dimensionless_grid",
     "dimensionless_plant",
     "dominant_roots",
     "frequency_response",
+    "from_control",
     "intervals_for",
+    "lifted_system",
+    "linear_axis",
     "load_rig",
+    "load_table",
     "loop_frd",
     "loop_transfer",
+    "pade_approximation",
     "parameter_margin",
     "plant_system",
+    "point_margins",
     "preset_structure",
     "prove_count",
     "pseudospectral_abscissa",
     "real_stability_radius",
+    "rig_grid",
     "rig_point_at_weight_on_bit",
     "root_sensitivity",
     "save_rig",
+    "save_table",
+    "scheduled_controller",
     "semidiscretize",
     "simulate",
+    "soft_torque",
     "spectral_abscissa",
     "spectral_abscissas",
     "stability_radius",
     "steady_state",
+    "table",
     "table1",
+    "time_response",
     "to_frd",
+    "top_drive_plant",
+    "with_actuator_lag",
+    "with_filter",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.feedback import FeedbackStructure, close_loop
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.plant import Plant
-from drillctrl.robustness import with_delay_factor
+from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.roots import Root, dominant_roots, spectral_abscissa
@@ -80,8 +80,6 @@ class LoopAnalysis:
         Whether α lies left of zero by more than the error, and the count agrees.
     dominant_roots : tuple of Root
         Those whose real part is within the error, or 1e-6 relative, of α.
-    spectral_radius : SpectralRadius or None
-        The semi-discretisation's view; None without delay or where it was not asked for.
     certificate : Certificate
         The count's view.
     """
@@ -90,7 +88,6 @@ class LoopAnalysis:
     abscissa_error: float
     stable: bool
     dominant_roots: tuple[Root, ...]
-    spectral_radius: SpectralRadius | None
     certificate: Certificate
 
     @property
@@ -99,27 +96,25 @@ class LoopAnalysis:
         return math.log(50.0) / -self.spectral_abscissa if self.stable else math.inf
 
 
-def analyze_loop(
+def discretised_radius(
     system: DelaySystem, m: int | None = None, order: int = DEFAULT_ORDER
-) -> LoopAnalysis:
-    """Analyse a delay system by roots, count and semi-discretisation.
+) -> SpectralRadius | None:
+    """Return the semi-discretisation's view of a loop; None without delay.
 
     Parameters
     ----------
     system : DelaySystem
         Any.
     m, order : int, optional
-        Of the semi-discretisation that is reported; see `semidiscretize`.
+        See `semidiscretize`.
     """
-    analysis = analyze_roots(system)
     if not system.delays:
-        return analysis
+        return None
     scheme = semidiscretize(system, m, order)
-    radius = SpectralRadius(scheme.spectral_radius, scheme.m, scheme.order, scheme.growth_rate)
-    return replace(analysis, spectral_radius=radius)
+    return SpectralRadius(scheme.spectral_radius, scheme.m, scheme.order, scheme.growth_rate)
 
 
-def analyze_roots(system: DelaySystem) -> LoopAnalysis:
+def analyze_loop(system: DelaySystem) -> LoopAnalysis:
     """Analyse a delay system by roots and count alone."""
     roots = dominant_roots(system)
     certificate = _certify(system, roots)
@@ -131,7 +126,6 @@ def analyze_roots(system: DelaySystem) -> LoopAnalysis:
         abscissa_error=error,
         stable=top.rightmost + error < 0.0 and certificate.agrees and top.converged,
         dominant_roots=tuple(root for root in roots if root.rightmost >= limit),
-        spectral_radius=None,
         certificate=certificate,
     )
 

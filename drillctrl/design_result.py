@@ -13,8 +13,9 @@ from drillctrl.analysis import (
     DEFAULT_ORDER,
     Fragility,
     LoopAnalysis,
+    SpectralRadius,
     analyze_loop,
-    analyze_roots,
+    discretised_radius,
     fragility,
     perturbed_plants,
 )
@@ -28,7 +29,8 @@ from drillctrl.optimisation.certificate import OptimalityCertificate
 from drillctrl.optimisation.family import loop_family
 from drillctrl.optimisation.objectives import NO_REQUIREMENTS, Exact, Objective, Requirements
 from drillctrl.plant import Plant
-from drillctrl.robustness import DelayMargin, StabilityRadius, delay_margin, stability_radius
+from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin, point_margins
+from drillctrl.robustness.radius import StabilityRadius, stability_radius
 from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:
@@ -68,8 +70,12 @@ class Design:
         What is fed back; None for an open loop.
     K1, K2 : array, (m, p)
         Gains on Y(t) and on Y(t − τ0).
-    loop, open_loop : LoopAnalysis
-        With and without the feedback.
+    loop : LoopAnalysis
+        With the feedback.
+    m : int or None
+        Intervals of the semi-discretisation that is reported; None: chosen to suit.
+    order : int
+        Its order.
     objective : Objective or None
         What the gains minimise; None for given gains.
     objective_value : float or None
@@ -94,7 +100,8 @@ class Design:
     K1: FloatArray
     K2: FloatArray
     loop: LoopAnalysis
-    open_loop: LoopAnalysis
+    m: int | None = None
+    order: int = DEFAULT_ORDER
     objective: Objective | None = None
     objective_value: float | None = None
     requirements: Requirements = NO_REQUIREMENTS
@@ -117,6 +124,16 @@ class Design:
     def minimises_alpha(self) -> bool:
         """Whether the gains minimise the spectral abscissa, and nothing was required beside."""
         return isinstance(self.objective, Exact) and not self.requirements
+
+    @functools.cached_property
+    def spectral_radius(self) -> SpectralRadius | None:
+        """ρ(D) of the semi-discretised loop; None without delay."""
+        return discretised_radius(self.system(), self.m, self.order)
+
+    @functools.cached_property
+    def open_loop(self) -> LoopAnalysis:
+        """Without the feedback."""
+        return self.loop if self.structure is None else analyze_loop(self.plant)
 
     @functools.cached_property
     def fragility(self) -> Fragility | None:
@@ -153,6 +170,13 @@ class Design:
         """How wrong the delays may be; None for a loop that is unstable or without delay."""
         loop = self.system()
         return delay_margin(loop) if self.stable and loop.delays else None
+
+    @functools.cached_property
+    def point_margins(self) -> dict[str, ParameterMargin] | None:
+        """How wrong ψ, δ0 and ω0 may each be; None for an unstable loop or a user's plant."""
+        if not self.stable or self.point is None or self.structure is None:
+            return None
+        return point_margins(self.point, self.structure, self.K1, self.K2, self.physics)
 
     def _perturbed(self) -> dict[str, DelaySystem]:
         return perturbed_plants(self.plant, self.point, self.physics)
@@ -243,7 +267,6 @@ def assess(
 ) -> Design:
     """Analyse the loop that the gains close, beside the open loop."""
     plant = subject.plant
-    loop = analyze_loop(closed_loop(plant, feedback, K1, K2), m, order)
-    open_loop = loop if feedback is None else analyze_roots(plant)
+    loop = analyze_loop(closed_loop(plant, feedback, K1, K2))
     where = subject.point, subject.rig_point, subject.physics
-    return Design(plant, *where, feedback, K1, K2, loop, open_loop)
+    return Design(plant, *where, feedback, K1, K2, loop, m, order)

@@ -176,4 +176,8 @@ def analyze(
             raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
         gains = gain_matrices(chosen, K1, K2)
         result = assess(_subject(point, chosen.inputs, plant), chosen, *gains, m, order)
-    return replace(result, elapsed_seconds=time.perf_counter() - began)
+    result = replace(result, elapsed_seconds=time.perf_counter() - began)
+    if m is not None or order != DEFAULT_ORDER:
+        # Refused now rather than when it is read.
+        _ = result.spectral_radius
+    return result

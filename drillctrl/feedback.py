@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -122,7 +123,7 @@ class FeedbackStructure:
         """Upper bounds of all entries of K1, then K2, row by row, shape (2 m p,)."""
         return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
 
-    @property
+    @functools.cached_property
     def entry_names(self) -> tuple[str, ...]:
         """Names of all entries of K1, then K2: ``K1_1``, or ``K1_1_1`` with several inputs."""
         rows, columns = self.K1_lower.shape
@@ -133,19 +134,19 @@ class FeedbackStructure:
             for j in range(columns)
         )
 
-    @property
+    @functools.cached_property
     def free(self) -> BoolArray:
         """Which entries of (K1, K2), flattened, are free; shape (2 m p,)."""
         followers = {tie.gain for tie in self.ties}
         leads = [name not in followers for name in self.entry_names]
         return np.asarray((self.flat_lower < self.flat_upper) & np.array(leads, dtype=bool))
 
-    @property
+    @functools.cached_property
     def gain_names(self) -> tuple[str, ...]:
         """Names of the free gains in the order of the vector."""
         return tuple(n for n, free in zip(self.entry_names, self.free, strict=True) if free)
 
-    @property
+    @functools.cached_property
     def spread(self) -> FloatArray:
         """How each entry of (K1, K2), flattened, follows the gain vector, (2 m p, k)."""
         names, columns = self.entry_names, self.gain_names
@@ -156,17 +157,17 @@ class FeedbackStructure:
             table[names.index(tie.gain), columns.index(tie.leader)] = tie.factor
         return table
 
-    @property
+    @functools.cached_property
     def fixed(self) -> FloatArray:
         """The fixed entries of (K1, K2), flattened; 0 where an entry is free or tied."""
         return np.where(self.flat_lower < self.flat_upper, 0.0, self.flat_lower)
 
-    @property
+    @functools.cached_property
     def lower(self) -> FloatArray:
         """Lower bounds of the gain vector, those of tied gains included, shape (k,)."""
         return self._limits()[0]
 
-    @property
+    @functools.cached_property
     def upper(self) -> FloatArray:
         """Upper bounds of the gain vector, those of tied gains included, shape (k,)."""
         return self._limits()[1]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.analysis import LoopAnalysis
 from drillctrl.design_result import Design
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import RigPoint
@@ -37,7 +36,7 @@ def design_fields(design: Design) -> dict[str, Any]:
         "bounds": _bounds(structure) if structure else None,
         "K1": design.K1.ravel().tolist(),
         "K2": design.K2.ravel().tolist(),
-        **_loop_fields(design.loop),
+        **_loop_fields(design),
         "open_loop": {
             "spectral_abscissa": design.open_loop.spectral_abscissa,
             "stable": design.open_loop.stable,
@@ -97,6 +96,13 @@ def _distance_fields(design: Design) -> dict[str, Any]:
         fields["delay_margin"] = {
             "shorter": margin.shorter,
             "longer": finite_or_none(margin.longer),
+            "limit": finite_or_none(margin.limit),
+        }
+    fields["point_margins"] = None
+    if design.point_margins is not None:
+        fields["point_margins"] = {
+            name: {"lower": errors.lower, "upper": errors.upper, "limit": errors.limit}
+            for name, errors in design.point_margins.items()
         }
     return fields
 
@@ -139,8 +145,8 @@ def _root_fields(root: Root) -> dict[str, Any]:
     }
 
 
-def _loop_fields(loop: LoopAnalysis) -> dict[str, Any]:
-    radius = loop.spectral_radius
+def _loop_fields(design: Design) -> dict[str, Any]:
+    loop, radius = design.loop, design.spectral_radius
     return {
         "spectral_abscissa": loop.spectral_abscissa,
         "spectral_abscissa_error": finite_or_none(loop.abscissa_error),

@@ -9,6 +9,7 @@ from drillctrl.analysis import LoopAnalysis
 from drillctrl.design_result import Design
 from drillctrl.fields import GIVE_UP, gain_units, has_alternative
 from drillctrl.optimisation.objectives import Robust, SemiDiscrete, WorstCase
+from drillctrl.robustness.margins import ParameterMargin
 from drillctrl.steady_state import steady_state
 
 _SYMBOLS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'"}
@@ -124,7 +125,7 @@ def _verdict_lines(design: Design) -> _Lines:
     counted = "undecided" if check.counted is None else str(check.counted)
     right = f"{counted} root(s) right of {check.line:.4g}, {check.found} found"
     lines.append(("Checked by", f"argument principle {word}: {right}"))
-    radius = loop.spectral_radius
+    radius = design.spectral_radius
     if radius is not None:
         lines.append(
             (
@@ -204,6 +205,15 @@ def _boundary_lines(design: Design) -> _Lines:
     return [("", f"no gains within the bounds reach α = {decision.line:.6g} ({where})")]
 
 
+_SYMBOLS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
+
+
+def _margin_text(errors: ParameterMargin) -> str:
+    """Return between which multiples of its assumed value a parameter may lie."""
+    upper = f"{1.0 + errors.upper:.4g}" + (" (or more)" if errors.upper == errors.limit else "")
+    return f"between {1.0 + errors.lower:.4g} and {upper} times the assumed"
+
+
 def _robustness_lines(design: Design) -> _Lines:
     """Say how near instability is, and what small errors do."""
     lines: _Lines = []
@@ -212,8 +222,11 @@ def _robustness_lines(design: Design) -> _Lines:
         radius = design.stability_radius
         lines.append(("Margins", f"relative errors of the plant below {radius.lower_bound:.2g}"))
     if (margin := design.delay_margin) is not None:
-        longer = "any" if math.isinf(margin.longer) else f"{margin.longer:.4g}"
+        longer = "any" if math.isinf(margin.limit) else f"{margin.limit:g} (or more)"
+        longer = longer if math.isinf(margin.longer) else f"{margin.longer:.4g}"
         lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times τ0"))
+    for name, errors in (design.point_margins or {}).items():
+        lines.append(("", f"{_SYMBOLS[name]} {_margin_text(errors)}"))
     if off is not None:
         lines.append(
             ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits")

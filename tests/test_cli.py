@@ -225,3 +225,34 @@ def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
         assert (code, out) == (2, "")
         assert err.count("\n") == 1
         assert "compiling" not in err
+
+
+def test_an_objective_and_a_requirement_on_the_command_line(capsys):
+    point = ["design", "--structure", "case1", "--json"]
+    _, exact, _ = run(capsys, *point)
+    _, worst, _ = run(capsys, *point, "--objective", "worst-case", "--psi-error", 0.2)
+    _, slow, _ = run(capsys, *point, "--max-input-gain", 1.02)
+    exact, worst, slow = (json.loads(text) for text in (exact, worst, slow))
+    assert exact["objective"]["name"] == "exact"
+    assert worst["objective"]["name"] == "worst-case"
+    # The worst of the box is no better than the nominal point, which is no better than the best.
+    assert worst["objective"]["value"] >= worst["spectral_abscissa"] >= exact["spectral_abscissa"]
+    assert slow["requirements"]["met"]
+    assert slow["spectral_abscissa"] > exact["spectral_abscissa"]
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--objective", "best"], "objective = best"),
+        (["--epsilon", "0.1"], "epsilon"),
+        (["--objective", "robust", "--epsilon", "-1"], "epsilon"),
+        (["--objective", "semidiscrete", "--m", "0"], "m = 0"),
+        (["--min-radius", "nan"], "stability_radius"),
+    ],
+)
+def test_bad_objectives_are_refused_in_one_line(capsys, options, named):
+    status, out, err = run(capsys, "design", "--structure", "p", *options)
+    assert (status, out) == (2, "")
+    assert named in err
+    assert err.count("\n") == 1

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.charts.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 from drillctrl.charts.scan import ScanLine
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 
 _PHASE_STEP = 0.4
 _LARGEST_TURN = 1.0

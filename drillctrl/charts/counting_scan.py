@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from drillctrl.charts.affine_scan import AffineLoops, count_roots, frequency_grid
-from drillctrl.charts.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 from drillctrl.charts.scan import IntArray, ScanLine
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 
 Matrices = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 _SAMPLES = 65

@@ -13,9 +13,9 @@ import math
 
 import numpy as np
 
-from drillctrl.charts.quasipolynomial import Quasipolynomials
 from drillctrl.charts.scan import ScanLine
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.quasipolynomial import Quasipolynomials
 
 # Lobes that are listed one by one; below the ω0 of the last one a bound decides.
 _FEWEST_TURNS, _MOST_TURNS = 6.0, 400.0

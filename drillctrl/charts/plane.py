@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drillctrl.charts.axes import RIG_AXES, Axis, to_si_factor
-from drillctrl.charts.quasipolynomial import Quasipolynomials, from_matrices
 from drillctrl.delay_system import DelaySystem, plant_system
 from drillctrl.errors import InputError
 from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
 from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.plant import PARAMETER_NAMES, dimensionless_plant, linearisation, parameter_vector
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices
 
 
 @dataclass(frozen=True, eq=False)

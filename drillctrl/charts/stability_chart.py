@@ -16,7 +16,6 @@ from drillctrl.charts.chains import Curve, stable_curves
 from drillctrl.charts.counting_scan import scan_counting
 from drillctrl.charts.delay_scan import scan_rotary_speed
 from drillctrl.charts.plane import Plane, check_plane
-from drillctrl.charts.quasipolynomial import from_matrices
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine, Scanner
 from drillctrl.charts.sweep import sweep
@@ -25,6 +24,7 @@ from drillctrl.feedback import FeedbackStructure, gain_matrices, preset_structur
 from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
+from drillctrl.spectrum.quasipolynomial import from_matrices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

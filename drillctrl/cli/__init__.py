@@ -10,6 +10,7 @@ from drillctrl.cli.analyze import analyze_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.design import design_command
 from drillctrl.cli.simulate import simulate_command
+from drillctrl.cli.table import table_command
 from drillctrl.errors import InputError
 
 BAD_INPUT = 2
@@ -25,7 +26,7 @@ def cli() -> None:
     """
 
 
-for _command in (design_command, analyze_command, chart_command, simulate_command):
+for _command in (design_command, analyze_command, chart_command, simulate_command, table_command):
     cli.add_command(_command)
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.optimisation.explicit import is_affine
 from drillctrl.optimisation.family import LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 
@@ -66,7 +65,7 @@ def decide(family: LoopFamily, line: float = 0.0) -> BoundaryDecision | None:
         None where there are more gains, or several inputs.
     """
     count = family.feedback.lower.size
-    if count not in (1, 2) or not is_affine(family):
+    if count not in (1, 2) or not family.is_affine:
         return None
     lower, upper = family.feedback.lower, family.feedback.upper
     pairs, omega = (_isolated if count == 1 else _curve)(family, line)
@@ -82,7 +81,8 @@ def decide(family: LoopFamily, line: float = 0.0) -> BoundaryDecision | None:
 
 
 def _affine(family: LoopFamily, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    return family.determinant(s, np.zeros(family.feedback.lower.size))
+    values, slopes = family.taylor(s, np.zeros(family.feedback.lower.size), 1)
+    return values[:, 0], slopes[:, 0]
 
 
 def _grid(family: LoopFamily, line: float) -> FloatArray:

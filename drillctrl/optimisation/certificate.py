@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.optimisation.active import active_jacobian
+from drillctrl.optimisation.conditions import conditions
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
 from drillctrl.optimisation.search import Search
 from drillctrl.spectrum.characteristic import FloatArray
@@ -109,7 +109,8 @@ def _lagrange(
     normals: list[FloatArray],
 ) -> float:
     """Return the smallest violation of the first-order conditions over all multipliers."""
-    jacobian = active_jacobian(family, gains, abscissa, roots)
+    task = conditions(family, gains, abscissa, roots)
+    jacobian = task.values(task.start)[1]
     jacobian = jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
     size = jacobian.shape[1]
     padded = [np.concatenate([n, np.zeros(size - gains.size)]) for n in normals]

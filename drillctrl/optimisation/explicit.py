@@ -12,15 +12,8 @@ import numpy as np
 from drillctrl.optimisation.family import LoopFamily
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
-_POINTS = 12
-_CIRCLE = np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)
 _ABSCISSAS = 40
 _FREQUENCIES = 12
-
-
-def is_affine(family: LoopFamily) -> bool:
-    """Whether det Δ is affine in all gains together: they drive one and the same input."""
-    return bool(np.linalg.matrix_rank(family.drive) == 1) if family.drive.size else False
 
 
 def explicit_candidates(
@@ -45,7 +38,7 @@ def explicit_candidates(
         Empty where the equations are not affine.
     """
     k = family.spread.shape[1]
-    if not is_affine(family):
+    if not family.is_affine:
         return np.zeros((0, k))
     depth = deepest * (np.arange(_ABSCISSAS) + 0.5) / _ABSCISSAS + 0.25
     omega = highest * ((np.arange(_FREQUENCIES) + 0.5) / _FREQUENCIES) ** 2
@@ -72,11 +65,9 @@ def _solve(family: LoopFamily, conditions: list[tuple[ComplexArray, int, bool]])
     rows, right = [], []
     k = family.spread.shape[1]
     for places, multiplicity, paired in conditions:
-        ring = places[..., None] + 0.1 * (1.0 + np.abs(places))[..., None] * _CIRCLE
-        value, slope = family.determinant(ring.ravel(), np.zeros(k))
-        wave = _CIRCLE[:, None] ** -np.arange(multiplicity) / _POINTS
-        constant = value.reshape(ring.shape) @ wave
-        linear = np.einsum("...pk,pl->...lk", slope.reshape(*ring.shape, k), wave)
+        values, slopes = family.taylor(places.ravel(), np.zeros(k), multiplicity)
+        constant = values.reshape(*places.shape, multiplicity)
+        linear = slopes.reshape(*places.shape, multiplicity, k)
         size = np.abs(constant).max(axis=-1) + 1e-300
         constant, linear = constant / size[..., None], linear / size[..., None, None]
         for part in (np.real, np.imag) if paired else (np.real,):

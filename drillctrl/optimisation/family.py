@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +13,14 @@ from scipy.linalg.lapack import dgeev
 from drillctrl.delay_system import DelaySystem
 from drillctrl.errors import InputError
 from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
+from drillctrl.optimisation.expansion import Expansion, expand
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
 
 BoolArray = npt.NDArray[np.bool_]
+
+_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
 
 
 @dataclass(frozen=True)
@@ -169,6 +173,50 @@ class LoopFamily:
         response = np.linalg.inv(delta) @ self.drive
         slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
         return value, slopes @ self.spread
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether det Δ is affine in all gains together: they drive one and the same input."""
+        return bool(np.linalg.matrix_rank(self.drive) == 1) if self.drive.size else False
+
+    @functools.cached_property
+    def expansion(self) -> Expansion | None:
+        """The determinant as a quasi-polynomial; None with several inputs or delays."""
+        if not self.is_affine or len(self.plain.delays) > 1:
+            return None
+        return expand(self.plain, self.drive, self.seen, self.late)
+
+    def taylor(
+        self, s: ComplexArray, gains: FloatArray, terms: int
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Expand det Δ(s) of the loop about many places.
+
+        Parameters
+        ----------
+        s : array, (q,)
+            Places; they may be roots.
+        gains : array, (k,)
+            The gain vector.
+        terms : int
+            Number of coefficients.
+
+        Returns
+        -------
+        array, (q, terms), and array, (q, terms, k)
+            Taylor coefficients and their derivatives by the gains.
+        """
+        if self.expansion is not None:
+            each = self.expansion.taylor(s, terms)
+            slopes = each[:, 1:].transpose(0, 2, 1) @ self.spread
+            return each[:, 0] + slopes @ gains, slopes
+        # Samples on a circle: aliasing falls with the power points − terms.
+        radius = 0.1 * (1.0 + np.abs(s))
+        ring = s[:, None] + radius[:, None] * _CIRCLE
+        value, slope = self.determinant(ring.ravel(), gains)
+        wave = _CIRCLE[:, None] ** -np.arange(terms) / _CIRCLE.size
+        scale = radius[:, None] ** -np.arange(terms)
+        slopes = np.einsum("qpk,pl->qlk", slope.reshape(*ring.shape, gains.size), wave)
+        return value.reshape(ring.shape) @ wave * scale, slopes * scale[..., None]
 
     def seen_at(self, s: ComplexArray) -> ComplexArray:
         """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""

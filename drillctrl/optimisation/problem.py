@@ -21,7 +21,7 @@ from drillctrl.optimisation.objectives import (
 )
 from drillctrl.optimisation.rounding import hold_multiple_root
 from drillctrl.optimisation.search import global_search
-from drillctrl.robustness import pseudospectral_abscissa
+from drillctrl.robustness.radius import pseudospectral_abscissa
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.semidiscretization import semidiscretize
 from drillctrl.transfer import frequency_grid, loop_transfer

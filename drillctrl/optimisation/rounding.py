@@ -94,12 +94,10 @@ def hold_multiple_root(family: LoopFamily, basin: Basin) -> FloatArray:
         return basin.gains
     with localcontext(Context(prec=_DIGITS)):
         gains, t = basin.gains.copy(), Decimal(basin.value)
-        ring = float(t) + 0.1 * np.exp(2j * np.pi * np.arange(16) / 16)
         for _ in range(3):
             residual = _taylor(family.loop(gains), t, k + 1)
-            _, slopes = family.determinant(ring, gains)
-            by_gain = np.real(np.exp(-2j * np.pi * np.outer(np.arange(k), np.arange(16)) / 16)
-                              @ slopes[:, free]) / 16 / 0.1 ** np.arange(k)[:, None]  # fmt: skip
+            _, slopes = family.taylor(np.array([complex(float(t))]), gains, k)
+            by_gain = slopes[0, :, free].real.T
             jacobian = np.zeros((k, k))
             jacobian[:, : k - 1] = by_gain
             jacobian[:, -1] = [float((i + 1) * residual[i + 1]) for i in range(k)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from drillctrl.spectrum.roots import spectral_abscissa
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
+# How often a descent may be taken up again where sharpening led away from its end.
+_DESCENTS = 4
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,9 @@ class Effort:
     Attributes
     ----------
     looked : int
-        Points of the box at which the abscissa is evaluated; a power of two.
+        Points of the box at which the abscissa is evaluated.
     begun : int
-        Descents begun at the best of them.
+        Descents begun at the best of them; with 0, none are looked at.
     steps : int
         Evaluations of each descent.
     sharpened : int
@@ -92,7 +95,12 @@ class Search:
     evaluations: int
 
 
-def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = None) -> Search:
+def global_search(
+    family: LoopFamily,
+    seed: int = 0,
+    effort: Effort | None = None,
+    known: Sequence[FloatArray] = (),
+) -> Search:
     """Minimise the collocated abscissa over the box of the family's structure.
 
     Parameters
@@ -100,9 +108,11 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
     family : LoopFamily
         Loops to choose from.
     seed : int
-        Scrambles the Sobol points; the same seed gives the same result.
+        Scrambles the Halton points; the same seed gives the same result.
     effort : Effort, optional
         By default according to the number of gains.
+    known : sequence of array, (k,)
+        Gains that are good nearby; descents begin there too.
     """
     lower, upper = family.feedback.lower, family.feedback.upper
     count = lower.size
@@ -111,8 +121,11 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
         only = Basin(lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
-    starts = starting_points(family, seed, effort)
-    evaluations = 2 * effort.looked
+    starts = [np.clip(gains, lower, upper) for gains in known]
+    evaluations = 0
+    if effort.begun:
+        starts += list(starting_points(family, seed, effort))
+        evaluations += 2 * effort.looked
     ends = []
     for start in starts:
         end = bfgs(family.abscissa, start, lower, upper, most=effort.steps)
@@ -124,11 +137,11 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
     width = upper - lower
     for i, basin in enumerate(ends):
         # Another descent into the same corner teaches nothing.
-        known = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
-        if len(sharp) == effort.sharpened or known:
+        seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
+        if len(sharp) == effort.sharpened or seen:
             rest.append(basin)
             continue
-        better, used = improve(family, basin, effort.rounds)
+        better, used = _settle(family, basin, effort)
         evaluations += used
         sharp.append(better)
     everything = sorted([*sharp, *rest], key=lambda basin: basin.value)
@@ -140,9 +153,9 @@ def global_search(family: LoopFamily, seed: int = 0, effort: Effort | None = Non
 
 
 def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
-    """Return the best points of two Sobol sets, over the box and over its middle part."""
+    """Return the best points of two Halton sets, over the box and over its middle part."""
     lower, upper = family.feedback.lower, family.feedback.upper
-    cube = qmc.Sobol(lower.size, scramble=True, rng=seed).random(effort.looked)
+    cube = qmc.Halton(lower.size, scramble=True, rng=seed).random(effort.looked)
     wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
     # The box is generous: many useful gains are small against it.
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
@@ -151,8 +164,24 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     order = np.argsort(values, kind="stable")
     deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
     placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
-    chosen = np.vstack([placed, points[order[: effort.begun - len(placed)]]])
+    chosen = np.vstack([placed, points[order[: max(0, effort.begun - len(placed))]]])
     return np.asarray(np.clip(chosen, inside[0], inside[1]))
+
+
+def _settle(family: LoopFamily, basin: Basin, effort: Effort) -> tuple[Basin, int]:
+    """Sharpen an end; where that leads away from it, descend again from there."""
+    lower, upper = family.feedback.lower, family.feedback.upper
+    best, used = improve(family, basin, effort.rounds)
+    before = basin.value
+    for _ in range(_DESCENTS):
+        if best.roots or best.value > before - 1e-4 * (1.0 + abs(before)):
+            break
+        before = best.value
+        end = bfgs(family.abscissa, best.gains, lower, upper, most=effort.steps)
+        again, more = improve(family, Basin(end.gains, end.value, ()), effort.rounds)
+        used += end.evaluations + more
+        best = min(best, again, key=lambda basin: basin.value)
+    return best, used
 
 
 def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:

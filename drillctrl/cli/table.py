@@ -1,0 +1,218 @@
+"""`drillctrl table`."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.tables.grid import Axis, Grid
+    from drillctrl.tables.table import Progress
+    from drillctrl.units import Dimension
+
+_GROUPS = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades")
+_RIG = ("rig", "speed", "rop", "wob", "rock_strength")
+
+
+@click.command(name="table")
+@click.option("--omega0", metavar="LOW:HIGH:COUNT", help="Rotary speed ω0, or one number.")
+@click.option("--delta0", metavar="LOW:HIGH:COUNT", help="Depth of cut δ0, or one number.")
+@click.option("--psi", metavar="LOW:HIGH:COUNT", help="Cutting coefficient ψ (default 14).")
+@click.option("--eta", type=float, help="Frequency ratio η (default 1.6).")
+@click.option("--xi", type=float, help="Axial damping ratio ξ (default 0.02).")
+@click.option("--kappa", type=float, help="Torsional damping ratio κ (default 0.02).")
+@click.option("--damping", type=float, help="Sets ξ and κ together.")
+@click.option("--blades", type=float, help="Number of blades n (default 4).")
+@click.option("--rig", help="Preset (table1) or TOML file, instead of the above.")
+@click.option("--speed", metavar="'LOW:HIGH:COUNT UNIT'", help="Such as '90:180:10 rpm'.")
+@click.option("--rop", metavar="'LOW:HIGH:COUNT UNIT'", help="Such as '5:30:6 m/h'.")
+@click.option("--wob", metavar="'LOW:HIGH:COUNT UNIT'", help="Instead of --rop: '20:80:7 kN'.")
+@click.option("--rock-strength", metavar="'LOW:HIGH:COUNT UNIT'", help="Such as '40:80:5 MPa'.")
+@click.option("--structure", default="case1", show_default=True, help="p, case1, pd or case2.")
+@click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
+@click.option(
+    "--smooth",
+    type=float,
+    default=0.0,
+    metavar="PERCENT",
+    help="Smoothest table that gives up at most this share of the best decay rate.",
+)
+@click.option(
+    "--fallback",
+    default="off",
+    show_default=True,
+    help="Where nothing stabilises: off (no control) or best (best gains found).",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
+@click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
+@click.option("--require-stable", is_flag=True, help="Exit with 3 if a node is not stable.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--out", type=click.Path(), help="Write FILE.csv, .json, .parquet, .mat or .nc.")
+@click.option("--plot", type=click.Path(), help="Draw gains and α: FILE.png, .svg, .pdf.")
+def table_command(
+    structure: str,
+    bound: tuple[str, ...],
+    smooth: float,
+    fallback: str,
+    seed: int,
+    workers: int,
+    require_stable: bool,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **grid: Any,
+) -> None:
+    """Design gains over a grid of operating points, and check them between the nodes.
+
+    \b
+    Examples:
+      drillctrl table --omega0 4:24:21 --delta0 0.25:12:16 --psi 14 --out gains.csv
+      drillctrl table --rig table1 --speed "140:260:7 rpm" --rop "10:60:6 m/h" --out gains.csv
+    """
+    check_folder("--out", out)
+    check_figure(plot)
+    if not 0.0 <= smooth <= 90.0:
+        raise InputError("--smooth", smooth, "a number in [0, 90]")
+    if not 1 <= workers <= 1024:
+        raise InputError("--workers", workers, "a whole number in [1, 1024]")
+    nodes = _read_grid({k: v for k, v in grid.items() if v is not None})
+    from drillctrl.tables.files import check_table_path, save_table
+    from drillctrl.tables.table import table
+
+    if out is not None:
+        check_table_path(out)
+    with _executor(workers) as executor, _progress() as progress:
+        result = table(
+            nodes,
+            structure,
+            bounds=read_bounds(bound),
+            give_up=smooth / 100.0,
+            fallback=fallback,
+            seed=seed,
+            executor=executor,
+            progress=progress,
+        )
+    if out is not None:
+        writing("--out", out, lambda: save_table(result, out))
+    if plot is not None:
+        write_figure(plot, result.plot())
+    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+    if require_stable and not result.stable.all():
+        raise click.exceptions.Exit(3)
+
+
+@contextlib.contextmanager
+def _executor(workers: int) -> Iterator[Executor | None]:
+    if workers == 1:
+        yield None
+        return
+    import multiprocessing
+
+    # A forked child would inherit the threads of the linear algebra.
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        yield pool
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """Yield what draws progress on a terminal; nothing is drawn into a file."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    bars: list[tqdm[Any]] = []
+
+    def show(stage: str, done: int, total: int) -> None:
+        if done == 1:
+            bars.append(tqdm(total=total, desc=stage, unit="node", file=sys.stderr, leave=False))
+        bars[-1].update()
+        if done == total:
+            bars[-1].close()
+
+    try:
+        yield show
+    finally:
+        for bar in bars:
+            bar.close()
+
+
+def _read_grid(given: dict[str, Any]) -> Grid:
+    from drillctrl.tables.grid import dimensionless_grid
+
+    groups = {k: given[k] for k in _GROUPS if k in given}
+    rig = {k: given[k] for k in _RIG if k in given}
+    if groups and rig:
+        first = next(iter(groups))
+        raise InputError(f"--{first}", groups[first], "left out where a rig is given")
+    if rig:
+        return _rig_grid(rig)
+    for name in ("omega0", "delta0"):
+        if name not in groups:
+            raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
+    from drillctrl.operating_point import OperatingPoint
+
+    damping = groups.pop("damping", None)
+    if damping is not None:
+        for name in ("xi", "kappa"):
+            if name in groups:
+                raise InputError(f"--{name}", groups[name], "left out where --damping is given")
+            groups[name] = damping
+    axes = {name: _axis(name, str(groups.pop(name, "14")), None) for name in _GROUPS[:3]}
+    corner = {name: axis.values[0] for name, axis in axes.items()}
+    return dimensionless_grid(**axes, reference=OperatingPoint(**{**corner, **groups}))
+
+
+def _rig_grid(given: dict[str, str]) -> Grid:
+    from drillctrl import units
+    from drillctrl.rig import load_rig
+    from drillctrl.tables.grid import rig_grid
+
+    for name in ("rig", "speed"):
+        if name not in given:
+            raise InputError(f"--{name}", "(missing)", "given, for a grid in rig units")
+    if ("rop" in given) == ("wob" in given):
+        shown = given.get("rop", "(missing)")
+        raise InputError("--rop", shown, "given, such as '5:30:6 m/h', or else --wob")
+    further = {
+        "rop": ("penetration_rate", units.SPEED),
+        "wob": ("weight_on_bit", units.FORCE),
+        "rock_strength": ("rock_strength", units.STRESS),
+    }
+    axes: dict[str, Any] = {
+        name: _axis(option, given[option], dimension, name)
+        for option, (name, dimension) in further.items()
+        if option in given
+    }
+    speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
+    return rig_grid(load_rig(given["rig"]), speed, **axes)
+
+
+def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:
+    """Read ``LOW:HIGH:COUNT`` or one number, with a unit behind it where there is one."""
+    from drillctrl import units
+    from drillctrl.tables.grid import linear_axis
+
+    flag = f"--{option.replace('_', '-')}"
+    numbers, _, unit = text.strip().partition(" ")
+    parts = numbers.split(":")
+    example = "4:24:21" if dimension is None else f"such as '60:180:13 {dimension.unit}'"
+    try:
+        if len(parts) not in (1, 3) or (dimension is None and unit):
+            raise ValueError
+        count = int(parts[2]) if len(parts) == 3 else 1
+        ends = [float(part) for part in (parts[:2] if len(parts) == 3 else parts * 2)]
+    except ValueError:
+        raise InputError(flag, text, f"LOW:HIGH:COUNT, {example}") from None
+    if dimension is not None:
+        ends = [units.to_si(flag, f"{end!r} {unit}", dimension) for end in ends]
+    return linear_axis(name or option, ends[0], ends[1], count)

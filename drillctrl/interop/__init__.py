@@ -1,0 +1,1 @@
+"""Ways into python-control and back."""

@@ -1,0 +1,1 @@
+"""How far a stable loop is from instability: matrices, delays and operating point."""

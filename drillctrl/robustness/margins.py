@@ -1,0 +1,238 @@
+"""By how much the delays or one parameter may be wrong before a loop loses stability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+
+from drillctrl.delay_system import DelaySystem, plant_system
+from drillctrl.errors import InputError, checked_number
+from drillctrl.feedback import FeedbackStructure, close_loop
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.plant import Plant
+from drillctrl.robustness.axis import crossings, sharpen_crossing
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.roots import spectral_abscissa
+
+LONGEST_DELAYS = 10.0
+
+
+@dataclass(frozen=True)
+class DelayMargin:
+    """Delays, as multiples of the present ones, at which the loop loses stability.
+
+    Attributes
+    ----------
+    shorter, longer : float
+        Nearest critical factors below and above 1; 0 and inf where there is none.
+    frequency_shorter, frequency_longer : float
+        Frequencies of the roots that cross there; NaN where there is none.
+    limit : float
+        Factors up to this were looked at.
+    """
+
+    shorter: float
+    longer: float
+    frequency_shorter: float
+    frequency_longer: float
+    limit: float = math.inf
+
+
+@dataclass(frozen=True)
+class ParameterMargin:
+    """Relative errors of one parameter between which the loop stays stable.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Nearest relative changes that destabilise; −1 or ``limit`` if none does before.
+    limit : float
+        Largest relative increase looked at.
+    resolution : float
+        An unstable window narrower than this (relative) may have been stepped over.
+    """
+
+    lower: float
+    upper: float
+    limit: float
+    resolution: float
+
+
+def delay_margin(system: DelaySystem) -> DelayMargin:
+    """Return by how much the delays may be wrong before a root reaches the axis.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        A stable loop with delays; several are multiplied by a common factor.
+
+    Raises
+    ------
+    InputError
+        If the loop has no delay or is unstable.
+    ArithmeticError
+        If several delays leave the loop too near instability to tell crossings apart.
+
+    Notes
+    -----
+    With one delay and z = exp(−iωτ) a root on the axis makes both A0 + zA1 and its conjugate
+    singular against ±iω, so their Kronecker sum is singular: the quadratic eigenvalue
+    problem z²(A1⊗I) + z(A0⊗I + I⊗A0) + I⊗A1 has all critical z on the unit circle (Chen, Gu
+    and Nett 1995). With several delays, boxes of frequency and factor that a Lipschitz bound
+    clears of roots are removed, up to ten times the delays. No crossing is stepped over.
+    """
+    if not system.delays:
+        raise InputError("delays", system.delays, "at least one")
+    if spectral_abscissa(system) >= 0.0:
+        raise InputError("system", "an unstable loop", "stable")
+    if len(system.delays) == 1:
+        limit, factors = math.inf, list(_nearest_factors(system))
+    else:
+        limit = LONGEST_DELAYS
+        factors = crossings(system, 0.0, 1.0) + crossings(system, 1.0, limit)
+    below = max((f for f in factors if f[0] < 1.0), default=(0.0, math.nan))
+    above = min((f for f in factors if f[0] > 1.0), default=(math.inf, math.nan))
+    return DelayMargin(below[0], above[0], below[1], above[1], limit)
+
+
+def _nearest_factors(system: DelaySystem) -> Iterator[tuple[float, float]]:
+    """Yield (f, ω): for every critical pair of ω and angle the nearest delays of either side."""
+    tau, a0, a1 = system.delays[0], system.A0, system.delayed[0]
+    for z, omega in _critical_pairs(a0, a1):
+        turn = 2.0 * math.pi / (omega * tau)
+        first = (-float(np.angle(z)) % (2.0 * math.pi)) / (omega * tau)
+        below = first + turn * math.floor((1.0 - first) / turn)
+        for guess in (below, below + turn):
+            sharp = sharpen_crossing(system, omega, guess) if guess > 0.0 else None
+            if sharp is not None:
+                yield sharp
+
+
+def _critical_pairs(a0: FloatArray, a1: FloatArray) -> Iterator[tuple[complex, float]]:
+    """Yield (z, ω > 0) with |z| near 1 and iω near an eigenvalue of A0 + zA1."""
+    eye = np.eye(len(a0))
+    size = len(a0) ** 2
+    m2, m0 = np.kron(a1, eye), np.kron(eye, a1)
+    m1 = np.kron(a0, eye) + np.kron(eye, a0)
+    zero, one = np.zeros((size, size)), np.eye(size)
+    pencil = np.block([[zero, one], [-m0, -m1]]), np.block([[one, zero], [zero, m2]])
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        values = scipy.linalg.eigvals(*pencil)
+    values = values[np.isfinite(values)]
+    for z in values[np.abs(np.abs(values) - 1.0) < 1e-4]:
+        for s in np.linalg.eigvals(a0 + z * a1):
+            if abs(s.real) <= 1e-3 * (1.0 + abs(s)) and s.imag >= 1e-9:
+                yield complex(z), float(s.imag)
+
+
+def parameter_margin(
+    loop_at: Callable[[float], DelaySystem], limit: float = 1.0, points: int = 200
+) -> ParameterMargin:
+    """Return the relative errors of a parameter between which a loop stays stable.
+
+    Parameters
+    ----------
+    loop_at : callable
+        Returns the loop when the parameter is (1 + e) times its nominal value, e > −1.
+    limit : float
+        Largest relative increase to look at.
+    points : int
+        Steps in either direction; each change of sign is bisected to 1e-12, and wherever α
+        has a maximum among the steps it is sought between them.
+
+    Raises
+    ------
+    InputError
+        If the loop is unstable at the nominal value.
+    """
+    top = checked_number("limit", limit, 0.0, 1e3, open_low=True)
+
+    def alpha(error: float) -> float:
+        return spectral_abscissa(loop_at(error))
+
+    if alpha(0.0) >= 0.0:
+        raise InputError("loop", "unstable at the nominal value", "stable")
+    down = -np.linspace(0.0, 1.0, points + 1)[:-1]
+    up = np.linspace(0.0, top, points + 1)
+    lower, upper = _first_unstable(alpha, down), _first_unstable(alpha, up)
+    return ParameterMargin(
+        -1.0 if lower is None else lower,
+        top if upper is None else upper,
+        top,
+        max(top, 1.0) / points,
+    )
+
+
+def _first_unstable(alpha: Callable[[float], float], errors: FloatArray) -> float | None:
+    """Return the error nearest to the first at which α reaches 0; None if it does not."""
+    values = [alpha(float(errors[0]))]
+    for index, error in enumerate(errors[1:], 1):
+        values.append(alpha(float(error)))
+        stable, unstable = float(errors[index - 1]), float(error)
+        if index > 1 and values[-2] >= max(values[-3], values[-1]):
+            before = float(errors[index - 2])
+            ends = sorted((before, unstable))
+            peak = scipy.optimize.minimize_scalar(
+                lambda e: -alpha(float(e)), bounds=(ends[0], ends[1]), method="bounded"
+            )
+            if peak.fun <= 0.0:
+                return float(scipy.optimize.brentq(alpha, before, float(peak.x), xtol=1e-12))
+        if values[-1] >= 0.0:
+            return float(scipy.optimize.brentq(alpha, stable, unstable, xtol=1e-12))
+    return None
+
+
+def point_margins(
+    point: OperatingPoint,
+    feedback: FeedbackStructure,
+    K1: FloatArray,
+    K2: FloatArray,
+    physics: Plant | None = None,
+    limit: float = 1.0,
+) -> dict[str, ParameterMargin]:
+    """Return how wrong ψ, δ0 and ω0 may each be before a loop with fixed gains is unstable.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        As assumed by the designer.
+    feedback, K1, K2 : FeedbackStructure and arrays
+        The feedback. Its delay stays that of the assumed speed.
+    physics : Plant, optional
+        The plant's equations; by default `dimensionless_plant`.
+    limit : float
+        Largest relative increase to look at.
+
+    Returns
+    -------
+    dict
+        By the names ``psi``, ``delta0`` and ``omega0``.
+
+    Raises
+    ------
+    InputError
+        If the loop is unstable at the point.
+    """
+    inputs = feedback.inputs
+    assumed = plant_system(point, inputs, physics).max_delay
+
+    def margin(name: str) -> ParameterMargin:
+        def loop_at(error: float) -> DelaySystem:
+            there = point.with_changes(**{name: getattr(point, name) * (1.0 + error)})
+            plant = plant_system(there, inputs, physics)
+            return close_loop(plant, feedback, K1, K2, delay=assumed)
+
+        return parameter_margin(loop_at, limit)
+
+    return {name: margin(name) for name in ("psi", "delta0", "omega0")}
+
+
+def with_delay_factor(system: DelaySystem, factor: float) -> DelaySystem:
+    """Return the system with every delay multiplied by ``factor`` > 0."""
+    checked_number("factor", factor, 0.0, open_low=True)
+    return replace(system, delays=tuple(tau * factor for tau in system.delays))

@@ -1,0 +1,166 @@
+"""Designs over a grid, each begun at what was found beside it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.feedback import FeedbackStructure
+from drillctrl.spectrum.batch import spectral_abscissas
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.tables.grid import Grid
+from drillctrl.tables.node import NodeDesign, NodeTask, design_node
+
+Mapper = Callable[[Callable[[NodeTask], NodeDesign], Sequence[NodeTask]], Iterable[NodeDesign]]
+
+_ROUNDS = 4
+_MOST_KNOWN = 4
+
+
+def design_grid(
+    grid: Grid, structure: FeedbackStructure, seed: int, run: Mapper
+) -> list[NodeDesign]:
+    """Design every node of a grid.
+
+    Nodes of a coarse subgrid are searched over the whole box. Those between begin at the
+    gains around them, level by level, and a node at which the gains of a neighbour are
+    better than its own, or nearly so, is designed again from there, until none is.
+
+    Parameters
+    ----------
+    grid : Grid
+        Operating points.
+    structure : FeedbackStructure
+        With its bounds.
+    seed : int
+        Of the starting points; the same for every node.
+    run : callable
+        ``run(design_node, tasks)`` yields the designs of the tasks, in any order. The result
+        does not depend on how: tasks of one wave do not depend on each other.
+
+    Returns
+    -------
+    list of NodeDesign
+        In the order of the nodes.
+    """
+    found: dict[int, NodeDesign] = {}
+    stride = _coarse_stride(grid.shape)
+    while stride >= 1:
+        chosen = [
+            index
+            for index, place in enumerate(np.ndindex(grid.shape))
+            if index not in found and _on_level(place, grid.shape, stride)
+        ]
+        tasks = [
+            NodeTask(i, grid.points[i], structure, seed, _nearby(grid.shape, i, stride, found))
+            for i in chosen
+        ]
+        found.update({design.index: design for design in run(design_node, tasks)})
+        stride //= 2
+    for _ in range(_ROUNDS):
+        tasks = _restarts(grid, structure, seed, found)
+        better = 0
+        for design in run(design_node, tasks):
+            old = found[design.index]
+            if design.spectral_abscissa < old.spectral_abscissa - 1e-6:
+                found[design.index] = design
+                better += 1
+        if not better:
+            break
+    return [found[index] for index in range(len(grid.points))]
+
+
+def neighbours(shape: tuple[int, ...], index: int, reach: int = 1) -> list[int]:
+    """Return the nodes beside a node along the axes, at a distance of ``reach``."""
+    place = np.unravel_index(index, shape)
+    beside = []
+    for axis, step in itertools.product(range(len(shape)), (-reach, reach)):
+        other = [int(i) for i in place]
+        other[axis] += step
+        if 0 <= other[axis] < shape[axis]:
+            beside.append(int(np.ravel_multi_index(other, shape)))
+    return beside
+
+
+def edges(shape: tuple[int, ...]) -> npt.NDArray[np.intp]:
+    """Return all pairs of neighbouring nodes, (e, 2)."""
+    index = np.arange(math.prod(shape)).reshape(shape)
+    pairs = []
+    for axis in range(len(shape)):
+        low = np.delete(index, -1, axis=axis).ravel()
+        high = np.delete(index, 0, axis=axis).ravel()
+        pairs.append(np.column_stack([low, high]))
+    return np.concatenate(pairs)
+
+
+def _coarse_stride(shape: tuple[int, ...]) -> int:
+    """Return how far apart the nodes are that are searched over the whole box."""
+    nodes = math.prod(shape)
+    return 1 if nodes < 9 else 2 if nodes < 200 else 4 if nodes < 2000 else 8
+
+
+def _on_level(place: tuple[int, ...], shape: tuple[int, ...], stride: int) -> bool:
+    return all(
+        i % stride == 0 or (i == size - 1 and stride > 1)
+        for i, size in zip(place, shape, strict=True)
+    )
+
+
+def _nearby(
+    shape: tuple[int, ...], index: int, stride: int, found: dict[int, NodeDesign]
+) -> tuple[FloatArray, ...]:
+    """Return distinct gains of the nodes already designed around a node."""
+    if not found:
+        return ()
+    place = np.unravel_index(index, shape)
+    known: list[FloatArray] = []
+    for step in itertools.product((-stride, 0, stride), repeat=len(shape)):
+        other = [int(i) + s for i, s in zip(place, step, strict=True)]
+        if any(not 0 <= i < size for i, size in zip(other, shape, strict=True)):
+            continue
+        design = found.get(int(np.ravel_multi_index(other, shape)))
+        if design is not None and all(np.abs(design.gains - g).max() > 1e-3 for g in known):
+            known.append(design.gains)
+    if not known:
+        nearest = min(found, key=lambda i: _distance(shape, i, index))
+        known = [found[nearest].gains]
+    return tuple(known[:_MOST_KNOWN])
+
+
+def _distance(shape: tuple[int, ...], first: int, second: int) -> int:
+    a, b = np.unravel_index(first, shape), np.unravel_index(second, shape)
+    return sum(abs(int(i) - int(j)) for i, j in zip(a, b, strict=True))
+
+
+def _restarts(
+    grid: Grid, structure: FeedbackStructure, seed: int, found: dict[int, NodeDesign]
+) -> list[NodeTask]:
+    """Return tasks for the nodes at which the gains of a neighbour promise more."""
+    pairs = edges(grid.shape)
+    if not len(pairs) or not structure.lower.size:
+        return []
+    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    gains = np.array([found[i].gains for i in range(len(grid.points))])
+    own = np.array([found[i].spectral_abscissa for i in range(len(grid.points))])
+    groups = np.array([[p.omega0, p.delta0, p.psi] for p in grid.points])[pairs[:, 0]]
+    borrowed = spectral_abscissas(
+        grid.points[0],
+        {"omega0": groups[:, 0], "delta0": groups[:, 1], "psi": groups[:, 2]},
+        structure,
+        gains[pairs[:, 1]],
+    )
+    here, there = own[pairs[:, 0]], own[pairs[:, 1]]
+    promise = borrowed < here - 1e-6
+    # A neighbour that does much better by far other gains may sit in a better basin.
+    width = structure.upper - structure.lower
+    apart = np.abs((gains[pairs[:, 0]] - gains[pairs[:, 1]]) / width).max(axis=1) > 0.1
+    promise |= apart & (there < here - 0.02 * np.abs(here))
+    tasks = []
+    for index in np.unique(pairs[promise, 0]).tolist():
+        known = tuple(gains[j] for j in pairs[promise & (pairs[:, 0] == index), 1])
+        tasks.append(NodeTask(index, grid.points[index], structure, seed, known[:_MOST_KNOWN]))
+    return tasks

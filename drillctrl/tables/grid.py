@@ -1,0 +1,239 @@
+"""The grid of operating points of a table: dimensionless groups, or what a driller sets."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import InputError, checked_number
+from drillctrl.operating_point import OperatingPoint, RigPoint
+from drillctrl.plant import rig_coefficients, steady_load
+from drillctrl.rig import Rig
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.steady_state import rig_parameter_values, rig_point_at_weight_on_bit
+
+MAX_NODES = 1_000_000
+
+# What spans a grid, with SI units: in groups, or in rig units with one of two feeds.
+AXIS_UNITS = {
+    "omega0": "1",
+    "delta0": "1",
+    "psi": "1",
+    "rotary_speed": "rad/s",
+    "penetration_rate": "m/s",
+    "weight_on_bit": "N",
+    "rock_strength": "Pa",
+}
+DIMENSIONLESS = ("omega0", "delta0", "psi")
+RATE = ("rotary_speed", "penetration_rate", "rock_strength")
+WEIGHT = ("rotary_speed", "weight_on_bit", "rock_strength")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Rising values of one quantity.
+
+    Attributes
+    ----------
+    name : str
+        A key of `AXIS_UNITS`.
+    values : tuple of float
+        In its SI unit; at least one.
+
+    Raises
+    ------
+    InputError
+        If the values are none, not finite, or do not rise.
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if self.name not in AXIS_UNITS:
+            raise InputError("axis", self.name, f"one of {', '.join(AXIS_UNITS)}")
+        values = tuple(checked_number(self.name, value) for value in self.values)
+        if not values or any(b <= a for a, b in itertools.pairwise(values)):
+            raise InputError(self.name, list(values)[:4], "at least one value, rising")
+        object.__setattr__(self, "values", values)
+
+    @property
+    def unit(self) -> str:
+        """SI unit, ``"1"`` for a plain number."""
+        return AXIS_UNITS[self.name]
+
+
+def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
+    """Return evenly spaced values, both ends included."""
+    for end in (low, high):
+        checked_number(name, end)
+    if count == 1 and low == high:
+        return Axis(name, (low,))
+    if not 2 <= count <= MAX_NODES:
+        raise InputError(name, count, f"two to {MAX_NODES} values between different ends")
+    return Axis(name, tuple(np.linspace(low, high, count).tolist()))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All combinations of a rotary speed, a feed and a rock.
+
+    Attributes
+    ----------
+    axes : tuple of three Axis
+        Named as `DIMENSIONLESS`, `RATE` or `WEIGHT`, in that order. The last varies
+        fastest among the nodes.
+    reference : OperatingPoint or Rig
+        What does not vary: η, ξ, κ and n of a dimensionless grid, the rig of the others.
+
+    Raises
+    ------
+    InputError
+        If axes and reference do not fit, or there are more than `MAX_NODES` nodes.
+    """
+
+    axes: tuple[Axis, Axis, Axis]
+    reference: OperatingPoint | Rig
+
+    def __post_init__(self) -> None:
+        names = tuple(axis.name for axis in self.axes)
+        fitting = (DIMENSIONLESS,) if self.rig is None else (RATE, WEIGHT)
+        if names not in fitting:
+            wanted = " or ".join(", ".join(choice) for choice in fitting)
+            raise InputError("axes", ", ".join(names), wanted)
+        if math.prod(self.shape) > MAX_NODES:
+            raise InputError("grid", f"{math.prod(self.shape)} nodes", f"at most {MAX_NODES} nodes")
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig, of a grid in rig units."""
+        return self.reference if isinstance(self.reference, Rig) else None
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of values on each axis."""
+        a, b, c = (len(axis.values) for axis in self.axes)
+        return a, b, c
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """Coordinates of all nodes on the axes, (q, 3)."""
+        mesh = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
+        return np.column_stack([values.ravel() for values in mesh])
+
+    @functools.cached_property
+    def points(self) -> tuple[OperatingPoint, ...]:
+        """Operating points of all nodes."""
+        return tuple(self.point(*row) for row in self.coordinates.tolist())
+
+    def point(self, speed: float, feed: float, rock: float) -> OperatingPoint:
+        """Return the operating point at coordinates on the three axes."""
+        if isinstance(self.reference, OperatingPoint):
+            return self.reference.with_changes(omega0=speed, delta0=feed, psi=rock)
+        return self._rig_point(self.reference, speed, feed, rock).operating_point()
+
+    def _rig_point(self, rig: Rig, speed: float, feed: float, rock: float) -> RigPoint:
+        placed = rig.with_rock_strength(rock)
+        if self.axes[1].name == "weight_on_bit":
+            return rig_point_at_weight_on_bit(placed, speed, feed)
+        return RigPoint(placed, speed, feed)
+
+    def groups(self, coordinates: FloatArray) -> FloatArray:
+        """Return ω0, δ0 and ψ at coordinates on the axes, (q, 3) → (q, 3)."""
+        if self.rig is None:
+            return coordinates
+        points = [self.point(*row) for row in coordinates.tolist()]
+        return np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+
+    def locate(
+        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
+    ) -> FloatArray:
+        """Return coordinates on the axes of operating points, (q,) each → (q, 3)."""
+        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in
+                                       (omega0, delta0, psi)))  # fmt: skip
+        groups = np.column_stack([array.ravel() for array in arrays])
+        rig = self.rig
+        if rig is None:
+            return groups
+        speed = groups[:, 0] / rig.time_scale
+        # ψ is proportional to the strength, the axial scale to its inverse (Eqs. 14, 16).
+        unit = RigPoint(rig, 1.0, 0.0).operating_point().psi / rig.rock_strength
+        strength = groups[:, 2] / unit
+        length = rig.axial_scale * rig.rock_strength / strength
+        feed = groups[:, 1] * speed * length
+        if self.axes[1].name == "weight_on_bit":
+            values = dict(rig_parameter_values(RigPoint(rig, 1.0, 0.0)))
+            given = {"rotary_speed": speed, "penetration_rate": feed, "rock_strength": strength}
+            load = steady_load(rig_coefficients(SimpleNamespace(**{**values, **given})))
+            feed = np.asarray(load.weight_on_bit, dtype=float)
+        return np.column_stack([speed, feed, strength])
+
+
+def dimensionless_grid(
+    omega0: Axis | float,
+    delta0: Axis | float,
+    psi: Axis | float = 14.0,
+    reference: OperatingPoint | None = None,
+) -> Grid:
+    """Return a grid over dimensionless groups.
+
+    Parameters
+    ----------
+    omega0, delta0, psi : Axis or float
+        A number stands for an axis with one value.
+    reference : OperatingPoint, optional
+        Supplies the other groups; by default those of `OperatingPoint`.
+    """
+    axes = [_as_axis(*pair) for pair in zip(DIMENSIONLESS, (omega0, delta0, psi), strict=True)]
+    first = [axis.values[0] for axis in axes]
+    if reference is None:
+        reference = OperatingPoint(first[0], first[1], first[2])
+    # The node-dependent groups of the reference say nothing; one grid has one reference.
+    reference = replace(reference.with_changes(psi=first[2]), omega0=first[0], delta0=first[1])
+    return Grid((axes[0], axes[1], axes[2]), reference)
+
+
+def rig_grid(
+    rig: Rig,
+    rotary_speed: Axis | float,
+    *,
+    penetration_rate: Axis | float | None = None,
+    weight_on_bit: Axis | float | None = None,
+    rock_strength: Axis | float | None = None,
+) -> Grid:
+    """Return a grid in rig units, all SI.
+
+    Parameters
+    ----------
+    rig : Rig
+        Drill string and bit.
+    rotary_speed : Axis or float
+        rad/s.
+    penetration_rate, weight_on_bit : Axis or float
+        m/s, or N; one of the two.
+    rock_strength : Axis or float, optional
+        Pa; by default that of the rig.
+
+    Raises
+    ------
+    InputError
+        If both feeds or none is given.
+    """
+    if (penetration_rate is None) == (weight_on_bit is None):
+        raise InputError("penetration_rate", penetration_rate, "given, or else weight_on_bit")
+    names = RATE if weight_on_bit is None else WEIGHT
+    feed = penetration_rate if penetration_rate is not None else weight_on_bit
+    assert feed is not None
+    rock = rig.rock_strength if rock_strength is None else rock_strength
+    axes = [_as_axis(*pair) for pair in zip(names, (rotary_speed, feed, rock), strict=True)]
+    return Grid((axes[0], axes[1], axes[2]), rig)
+
+
+def _as_axis(name: str, given: Axis | float) -> Axis:
+    return given if isinstance(given, Axis) else Axis(name, (given,))

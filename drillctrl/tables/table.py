@@ -1,0 +1,307 @@
+"""`table`: gains over a grid of operating points, and the result that holds them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.feedback import FeedbackStructure, preset_structure
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.tables.continuation import design_grid
+from drillctrl.tables.grid import Grid
+from drillctrl.tables.interpolation import (
+    CELL_NAMES,
+    UNSAFE,
+    BoolArray,
+    Cells,
+    check_cells,
+    interpolated,
+    place,
+)
+from drillctrl.tables.node import NodeTask, check_node
+from drillctrl.tables.smoothing import largest_jump, smooth_gains
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FALLBACKS = ("off", "best")
+Result = TypeVar("Result")
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class GainTable:
+    """Gains at the nodes of a grid, and what is known at and between them.
+
+    Attributes
+    ----------
+    grid : Grid
+        Operating points; nodes are flattened with the last axis fastest.
+    structure : FeedbackStructure
+        What is fed back, and within what bounds.
+    gains : array, (q, k)
+        Gain vector at each node; u = K1 Y(t) + K2 Y(t − τ0) is added to θ''.
+    spectral_abscissa : array, (q,)
+        α with these gains, per unit of dimensionless time.
+    stable, certified : bool array, (q,)
+        Whether the loop is stable, and whether the count of its roots agrees.
+    best_abscissa : array, (q,)
+        The lowest α found at the node.
+    give_up : float
+        Share of the best decay rate that was given up for smoothness, 0 for none.
+    fallback : {"off", "best"}
+        What stands where nothing found stabilises: no control, or the best gains found.
+    seed : int
+        Of the searches.
+    cells : Cells
+        What is known between the nodes.
+    """
+
+    grid: Grid
+    structure: FeedbackStructure
+    gains: FloatArray
+    spectral_abscissa: FloatArray
+    stable: BoolArray
+    certified: BoolArray
+    best_abscissa: FloatArray
+    give_up: float
+    fallback: str
+    seed: int
+    cells: Cells
+
+    @property
+    def entries(self) -> FloatArray:
+        """All entries of K1, then K2, row by row, at each node, (q, 2 m p)."""
+        return self.entries_of(self.gains)
+
+    def entries_of(self, vectors: FloatArray) -> FloatArray:
+        """Return all entries of K1, then K2, of gain vectors, (q, k) → (q, 2 m p)."""
+        return np.asarray(self.structure.fixed + vectors @ self.structure.spread.T)
+
+    @property
+    def jump(self) -> tuple[float, tuple[int, int] | None]:
+        """Largest change between neighbouring stable nodes; see `largest_jump`."""
+        return largest_jump(self.grid, self.structure, self.gains, self.stable)
+
+    def gains_at(
+        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return interpolated gains, clamped at the edges of the grid.
+
+        Parameters
+        ----------
+        omega0, delta0, psi : array_like, (q,)
+            Dimensionless groups; numbers are repeated.
+
+        Returns
+        -------
+        K1, K2 : array, (q, m, p)
+        """
+        where = place(self.grid, self.grid.locate(omega0, delta0, psi))
+        flat = self.entries_of(interpolated(where, self.gains, self.cells))
+        half = flat.shape[1] // 2
+        shape = (len(flat), *self.structure.K1_lower.shape)
+        return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)
+
+    def stable_at(
+        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
+    ) -> BoolArray:
+        """Whether the table vouches for points: inside the grid, in cells that passed, (q,)."""
+        where = place(self.grid, self.grid.locate(omega0, delta0, psi))
+        return np.asarray(where.inside & (self.cells.mode[where.cell] != UNSAFE))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of the command line."""
+        jump, between = self.jump
+        return {
+            "schema": "drillctrl/table/1",
+            "structure": self.structure.name,
+            "shape": list(self.grid.shape),
+            "axes": {axis.name: list(axis.values) for axis in self.grid.axes},
+            "nodes": len(self.gains),
+            "stable_nodes": int(self.stable.sum()),
+            "certified_nodes": int(self.certified.sum()),
+            "fallback": self.fallback,
+            "give_up": self.give_up,
+            "largest_jump": jump,
+            "largest_jump_between": None
+            if between is None
+            else [self.grid.coordinates[i].tolist() for i in between],
+            "cells": {
+                name: int((self.cells.mode == mode).sum()) for mode, name in enumerate(CELL_NAMES)
+            },
+            "rows": [dict(zip(self.columns, row, strict=True)) for row in self.rows()],
+        }
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the first columns of a row, the same in every file."""
+        names = ("omega0", "delta0", "psi", *self.structure.entry_names)
+        return (*names, "spectral_abscissa", "stable", "certified", "best_abscissa")
+
+    def rows(self) -> list[list[float | bool]]:
+        """Return one row a node in the order of `columns`."""
+        return [
+            [point.omega0, point.delta0, point.psi, *gains, alpha, stable, certified, best]
+            for point, gains, alpha, stable, certified, best in zip(
+                self.grid.points,
+                self.entries.tolist(),
+                self.spectral_abscissa.tolist(),
+                self.stable.tolist(),
+                self.certified.tolist(),
+                self.best_abscissa.tolist(),
+                strict=True,
+            )
+        ]
+
+    def summary(self) -> str:
+        """Return a text for people."""
+        jump, between = self.jump
+        axes = [
+            f"{axis.name} {axis.values[0]:g} … {axis.values[-1]:g}"
+            + (f" {axis.unit}" if axis.unit != "1" else "")
+            + f" ({len(axis.values)})"
+            for axis in self.grid.axes
+        ]
+        lost = "lowest α at each node"
+        if self.give_up:
+            lost = f"smoothest found with at most {100 * self.give_up:g} % of the decay given up"
+        lines = [
+            f"Gain table, structure {self.structure.name}, {len(self.gains)} nodes",
+            f"  {', '.join(axes)}",
+            f"  Choice        {lost}",
+            f"  Nodes         {int(self.stable.sum())} stable, "
+            f"{int(self.certified.sum())} with the root count agreeing",
+        ]
+        unstable = int((~self.stable).sum())
+        if unstable:
+            stated = "control off" if self.fallback == "off" else "the best gains found, unstable"
+            lines.append(f"                {unstable} that nothing found stabilises: {stated}")
+        if self.stable.any():
+            alpha = self.spectral_abscissa[self.stable]
+            lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} where stable")
+        if between is not None:
+            ends = [np.array2string(self.grid.coordinates[i], precision=4) for i in between]
+            lines.append(
+                f"  Largest jump  {100 * jump:.1f} % of a gain's range, between {ends[0]} and "
+                f"{ends[1]}"
+            )
+        counts = [
+            f"{int((self.cells.mode == mode).sum())} {name}" for mode, name in enumerate(CELL_NAMES)
+        ]
+        lines.append(f"  Cells         {', '.join(counts)} (searched, not proved)")
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Draw gains and α over the grid; see `tables.plotting.plot_table`."""
+        from drillctrl.tables.plotting import plot_table
+
+        return plot_table(self)
+
+    def __repr__(self) -> str:
+        size = " × ".join(str(n) for n in self.grid.shape)
+        return f"<GainTable {self.structure.name}: {size} nodes, {int(self.stable.sum())} stable>"
+
+
+def table(
+    grid: Grid,
+    structure: str | FeedbackStructure = "case1",
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    give_up: float = 0.0,
+    fallback: str = "off",
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> GainTable:
+    """Design gains over a grid of operating points, and check them between the nodes.
+
+    Parameters
+    ----------
+    grid : Grid
+        From `dimensionless_grid` or `rig_grid`.
+    structure : str or FeedbackStructure
+        As for `design`.
+    bounds : mapping, optional
+        As for `design`.
+    give_up : float
+        0: the lowest α found at each node. Up to 0.9: the smoothest table found that keeps
+        α ≤ (1 − give_up) times the best at every node.
+    fallback : {"off", "best"}
+        What a node gets that nothing found stabilises: no control (fixed gains alone), or
+        the best gains found. It is marked as not stable either way.
+    seed : int
+        Of the searches; the same seed gives the same table.
+    executor : concurrent.futures.Executor, optional
+        Designs the nodes side by side; without it this process does, one after another. The
+        table does not depend on it.
+    progress : callable, optional
+        Called with the name of a stage, nodes done and nodes to do.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range or the structure does not fit the plant.
+    """
+    chosen = preset_structure(structure) if isinstance(structure, str) else structure
+    chosen = chosen.with_bounds(bounds or {})
+    share = checked_number("give_up", give_up, 0.0, 0.9)
+    checked_integer("seed", seed, 0, 2**63 - 1)
+    if fallback not in FALLBACKS:
+        raise InputError("fallback", fallback, f"one of {', '.join(FALLBACKS)}")
+
+    def run(
+        stage: str, work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
+    ) -> Iterable[Result]:
+        for done, result in enumerate(_spread_out(executor, work, tasks), 1):
+            if progress is not None:
+                progress(stage, done, len(tasks))
+            yield result
+
+    designs = design_grid(grid, chosen, seed, lambda work, tasks: run("design", work, tasks))
+    best = np.array([design.spectral_abscissa for design in designs])
+    gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
+    gains = smooth_gains(grid, chosen, gains, best, share)
+    if fallback == "off":
+        gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
+    tasks = [NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)]
+    checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
+    stable = np.array([check.stable for check in checks])
+    return GainTable(
+        grid,
+        chosen,
+        gains,
+        np.array([check.spectral_abscissa for check in checks]),
+        stable,
+        np.array([check.certified for check in checks]),
+        best,
+        share,
+        fallback,
+        seed,
+        check_cells(grid, chosen, gains, stable),
+    )
+
+
+def _spread_out(
+    executor: Executor | None, work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
+) -> Iterable[Result]:
+    """Yield the results of all tasks, in any order; chunks cost less than single tasks."""
+    if executor is None:
+        yield from map(work, tasks)
+        return
+    size = max(1, min(16, math.ceil(len(tasks) / 16)))
+    chunks = [tasks[i : i + size] for i in range(0, len(tasks), size)]
+    futures = [executor.submit(_work_through, work, chunk) for chunk in chunks]
+    for future in as_completed(futures):
+        yield from future.result()
+
+
+def _work_through(work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]) -> list[Result]:
+    return [work(task) for task in tasks]

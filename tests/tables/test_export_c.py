@@ -1,0 +1,114 @@
+import ctypes
+import subprocess
+
+import numpy as np
+import pytest
+
+from drillctrl import Controller, InputError, OperatingPoint, simulate
+from drillctrl.tables.export_c import export_c
+
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+# A sixteenth of the delay, so that the delayed output is a sample.
+PERIOD, LIMIT = POINT.delay / 16, 3.0
+FLAGS = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-Wconversion",
+    "-ffp-contract=off",
+]
+
+
+class Compiled:
+    def __init__(self, table, folder, real="double", ramp=0):
+        header, source = export_c(
+            table, folder, "drill", period=PERIOD, limit=LIMIT, real=real, ramp=ramp
+        )
+        binary = folder / f"drill_{real}_{table.structure.name}.so"
+        subprocess.run(
+            ["gcc", *FLAGS, "-shared", "-fPIC", "-o", str(binary), str(source)],
+            check=True, capture_output=True, text=True,
+        )  # fmt: skip
+        self.kind = ctypes.c_double if real == "double" else ctypes.c_float
+        self.library = ctypes.CDLL(str(binary))
+        self.library.drill_step.restype = self.kind
+        self.outputs = len(table.structure.outputs)
+        self.state = ctypes.create_string_buffer(1_000_000)
+        self.library.drill_init(self.state)
+        self.header = header.read_text()
+
+    def lookup(self, at):
+        gains = (self.kind * (2 * self.outputs))()
+        vouched = self.library.drill_lookup((self.kind * 3)(*at), gains)
+        return list(gains), bool(vouched)
+
+    def step(self, y, at, delay, on=1):
+        values = (self.kind * self.outputs)(*y)
+        return self.library.drill_step(
+            self.state, values, (self.kind * 3)(*at), self.kind(delay), on
+        )
+
+
+def test_lookup_equals_python(small, on_rig, tmp_path):
+    rng = np.random.default_rng(3)
+    for table in (small, on_rig):
+        compiled = Compiled(table, tmp_path)
+        low, high = table.grid.coordinates.min(axis=0), table.grid.coordinates.max(axis=0)
+        places = low + (high - low) * rng.uniform(-0.3, 1.3, (200, 3))
+        places[:, 2] = low[2]
+        for place, groups in zip(places, table.grid.groups(np.abs(places)), strict=True):
+            if (place <= 0).any():
+                continue
+            K1, K2 = table.gains_at(*groups)
+            gains, vouched = compiled.lookup(place)
+            expected = np.array([*K1.ravel(), *K2.ravel()])
+            rig = table.grid.rig
+            if rig is not None:
+                # N·m/rad and N·m·s/rad
+                expected *= rig.torsional_stiffness * np.array([1.0, rig.time_scale] * 2)
+            assert gains == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
+            assert vouched == table.stable_at(*groups)[0]
+
+
+def test_same_command_as_the_simulator_over_a_stick_slip_transient(small, tmp_path):
+    K1, K2 = small.gains_at(10.0, 2.5, 14.0)
+    start = 100.0
+    control = Controller("case1", K1[0], K2[0], activation=start, period=PERIOD, limit=LIMIT)
+    run = simulate(POINT, control, duration=130.0, initial={"dx": 1.0, "dtheta": 1.0})
+    assert any(event.name == "stick" for event in run.events)
+    samples = np.arange(-100, int(29.0 / PERIOD))
+    theta = run.at(start + samples * PERIOD).theta
+    held = run.at(start + (samples + 0.5) * PERIOD).torque
+    compiled = Compiled(small, tmp_path)
+    commanded = [
+        compiled.step([y], (10.0, 2.5, 14.0), POINT.delay, int(k >= 0))
+        for k, y in zip(samples.tolist(), theta.tolist(), strict=True)
+    ]
+    assert np.abs(held - commanded).max() < 1e-12
+    assert np.abs(held).max() == LIMIT
+    assert np.ptp(held[-500:]) > 1e-9
+
+
+def test_float_soft_start_and_switching(small, tmp_path):
+    compiled = Compiled(small, tmp_path, real="float", ramp=10)
+    at, delay = (10.0, 2.5, 14.0), POINT.delay
+    off = [compiled.step([0.1], at, delay, 0) for _ in range(50)]
+    on = [compiled.step([0.1], at, delay, 1) for _ in range(20)]
+    K1, K2 = small.gains_at(*at)
+    full = 0.1 * (K1.item() + K2.item())
+    assert off == [0.0] * 50
+    assert on[:10] == pytest.approx([full * (i + 1) / 10 for i in range(10)], rel=1e-5)
+    assert on[10:] == pytest.approx([full] * 10, rel=1e-5)
+    assert compiled.step([float("nan")], at, delay) == 0.0
+    assert compiled.step([1e9], at, delay) == pytest.approx(np.sign(K1.item()) * LIMIT)
+
+
+def test_header_says_what_it_holds_and_bad_input_is_refused(small, tmp_path):
+    compiled = Compiled(small, tmp_path)
+    for word in ("SHA-256", "omega0 (1)", "theta", "K1_1 -10..10"):
+        assert word in compiled.header
+    for wrong in ({"name": "1x"}, {"period": 0.0}, {"limit": -1.0}, {"real": "half"}):
+        with pytest.raises(InputError):
+            export_c(small, tmp_path, **{"name": "t", "period": 0.1, "limit": 1.0, **wrong})

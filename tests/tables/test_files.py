@@ -1,0 +1,145 @@
+import csv
+import json
+import pickle
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+import scipy.io
+import xarray
+
+from drillctrl import InputError, load_table, save_table
+from drillctrl.tables.document import checksum, to_document
+from drillctrl.tables.files import ENDINGS
+
+
+def assert_same(one, two):
+    assert one.grid == two.grid
+    for name in ("gains", "spectral_abscissa", "stable", "certified", "best_abscissa"):
+        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+    for name in ("mode", "spectral_abscissa", "gains"):
+        assert np.array_equal(getattr(one.cells, name), getattr(two.cells, name)), name
+    assert one.structure.name == two.structure.name
+    assert np.array_equal(one.structure.upper, two.structure.upper)
+    assert (one.give_up, one.fallback, one.seed) == (two.give_up, two.fallback, two.seed)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("which", ["small", "on_rig"])
+def test_round_trip_is_exact_and_bytes_repeat(ending, which, request, tmp_path):
+    given = request.getfixturevalue(which)
+    first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+    save_table(given, first)
+    loaded = load_table(first)
+    assert_same(given, loaded)
+    save_table(loaded, second)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_csv_as_others_read_it(on_rig, tmp_path):
+    path = tmp_path / "t.csv"
+    save_table(on_rig, path)
+    lines = path.read_text().splitlines()
+    header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
+    assert {"units", "sign_convention", "sample_time", "structure", "reference", "checksum"} <= set(
+        header
+    )
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    names = [
+        "omega0",
+        "delta0",
+        "psi",
+        "K1_1",
+        "K1_2",
+        "K2_1",
+        "K2_2",
+        "spectral_abscissa",
+        "stable",
+    ]
+    assert list(rows[0])[:9] == names
+    assert float(rows[-1]["K1_2"]) == on_rig.entries[-1, 1]
+    rig = on_rig.grid.rig
+    expected = float(rows[-1]["K1_2"]) * rig.torsional_stiffness * rig.time_scale
+    assert float(rows[-1]["K1_2_rig"]) == pytest.approx(expected, rel=1e-12)
+    assert json.loads(header["units"])["K1_2_rig"] == "N*m*s/rad"
+    point = on_rig.grid.points[-1]
+    assert float(rows[-1]["delay_s"]) == pytest.approx(point.delay * rig.time_scale, rel=1e-12)
+
+
+def test_other_tools_open_the_files(small, tmp_path):
+    for ending in (".parquet", ".mat", ".nc"):
+        save_table(small, tmp_path / f"t{ending}")
+    frame = pyarrow.parquet.read_table(tmp_path / "t.parquet")
+    assert frame["K1_1"].to_pylist() == small.entries[:, 0].tolist()
+    assert frame["stable"].to_pylist() == small.stable.tolist()
+    mat = scipy.io.loadmat(tmp_path / "t.mat")
+    assert mat["K2_1"].ravel().tolist() == small.entries[:, 1].tolist()
+    with xarray.open_dataset(tmp_path / "t.nc", engine="scipy") as data:
+        assert data["K1_1"].dims == ("omega0", "delta0", "psi")
+        near = data["K1_1"].sel(omega0=11.0, delta0=3.5, psi=14.0).item()
+        assert near == small.entries[4, 0]
+        assert data.attrs["Conventions"] == "CF-1.8"
+
+
+def refuse(path):
+    with pytest.raises(InputError) as caught:
+        load_table(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_truncated_or_foreign_files_are_refused(ending, small, tmp_path):
+    path = tmp_path / f"t{ending}"
+    save_table(small, path)
+    whole = path.read_bytes()
+    for share in (0.0, 0.3, 0.9):
+        path.write_bytes(whole[: int(share * len(whole))])
+        refuse(path)
+    path.write_bytes(pickle.dumps(small.gains))
+    refuse(path)
+    path.write_bytes(b"\x00" * 1000)
+    refuse(path)
+
+
+def test_changed_numbers_are_refused(small, tmp_path):
+    path = tmp_path / "t.csv"
+    save_table(small, path)
+    text = path.read_text()
+    rows = [line for line in text.splitlines() if not line.startswith("#")]
+    fields = rows[1].split(",")
+    changed = ",".join([*fields[:3], repr(float(fields[3]) + 1e-9), *fields[4:]])
+    path.write_text(text.replace(rows[1], changed))
+    assert "checksum" in refuse(path)
+    path.write_text(text.replace(rows[1], ",".join([*fields[:3], "nan", *fields[4:]])))
+    assert "not finite" in refuse(path)
+    path.write_text(text.replace(rows[1] + "\n", ""))
+    assert "announced" in refuse(path)
+
+
+def test_huge_announcements_are_refused_before_anything_is_read(small, tmp_path):
+    document = to_document(small)
+    header = {**document.header, "axes": {"omega0": list(range(40_000)),
+              "delta0": list(range(40_000)), "psi": [14.0]}}  # fmt: skip
+    header["checksum"] = checksum(header, document.columns)
+    path = tmp_path / "t.json"
+    columns = {name: values.tolist() for name, values in document.columns.items()}
+    path.write_text(json.dumps({**header, "columns": columns}))
+    assert "1600000000 rows announced" in refuse(path)
+
+
+def test_nan_gain_with_a_right_checksum_is_refused(small, tmp_path):
+    document = to_document(small)
+    columns = {**document.columns, "K1_1": np.full_like(document.columns["K1_1"], np.nan)}
+    header = {**document.header, "checksum": checksum(document.header, columns)}
+    path = tmp_path / "t.json"
+    lists = {name: values.tolist() for name, values in columns.items()}
+    path.write_text(json.dumps({**header, "columns": lists}))
+    assert "K1_1 that is not finite" in refuse(path)
+
+
+def test_unknown_endings_and_missing_files(small, tmp_path):
+    for name in ("t.pkl", "t", "t.npz"):
+        with pytest.raises(InputError):
+            save_table(small, tmp_path / name)
+    assert "No such file" in refuse(tmp_path / "none.csv")

@@ -1,0 +1,137 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    InputError,
+    OperatingPoint,
+    analyze,
+    design,
+    dimensionless_grid,
+    linear_axis,
+    rig_grid,
+    spectral_abscissas,
+    table,
+    table1,
+)
+from drillctrl.tables.grid import Axis
+
+
+def test_nodes_are_as_good_as_single_designs_and_agree_with_analyze(small):
+    K1, K2 = small.gains_at(*np.array([[p.omega0, p.delta0, p.psi] for p in small.grid.points]).T)
+    for i, point in enumerate(small.grid.points):
+        assert small.spectral_abscissa[i] <= design(point, "case1").spectral_abscissa + 1e-4
+        again = analyze(point, "case1", K1[i], K2[i])
+        # Interpolated at a node: equal up to rounding, which a triple root shows as its cube root.
+        assert again.spectral_abscissa == pytest.approx(small.spectral_abscissa[i], abs=1e-4)
+    assert small.certified.all()
+    assert small.stable.all()
+
+
+def test_random_points_between_nodes_are_stable_where_the_table_says_so(small):
+    rng = np.random.default_rng(7)
+    omega0, delta0 = rng.uniform(8, 14, 1000), rng.uniform(1, 6, 1000)
+    vouched = small.stable_at(omega0, delta0, 14.0)
+    K1, K2 = small.gains_at(omega0, delta0, 14.0)
+    vectors = np.column_stack([K1.reshape(1000, -1), K2.reshape(1000, -1)])
+    alpha = spectral_abscissas(
+        small.grid.points[0], {"omega0": omega0, "delta0": delta0}, small.structure, vectors
+    )
+    assert vouched.sum() > 500
+    assert (alpha[vouched] < 0.0).all()
+
+
+def test_interpolation_is_bilinear_and_clamped(small):
+    corner = [np.ravel_multi_index((i, j, 0), small.grid.shape) for i in (0, 1) for j in (0, 1)]
+    K1, K2 = small.gains_at(9.5, 2.25, 14.0)
+    mean = small.gains[corner].mean(axis=0)
+    assert [K1.item(), K2.item()] == pytest.approx(mean.tolist(), rel=1e-12)
+    far, edge = small.gains_at(99.0, 0.0, 14.0), small.gains_at(14.0, 1.0, 14.0)
+    assert far[0].item() == edge[0].item()
+    assert not small.stable_at(99.0, 0.0, 14.0).any()
+
+
+def test_smoothing_keeps_its_promise(small):
+    smooth = table(small.grid, "case1", give_up=0.1)
+    assert smooth.jump[0] < small.jump[0]
+    assert (smooth.spectral_abscissa <= 0.9 * smooth.best_abscissa + 1e-6).all()
+    assert (np.abs(smooth.gains) <= 10.0).all()
+
+
+def test_nodes_that_nothing_stabilises(on_rig):
+    slow = ~on_rig.stable
+    assert slow.any()
+    assert on_rig.stable.any()
+    assert not on_rig.gains[slow].any()
+    for i in np.flatnonzero(slow).tolist():
+        open_loop = analyze(on_rig.grid.points[i]).spectral_abscissa
+        assert on_rig.spectral_abscissa[i] == pytest.approx(open_loop, abs=1e-9)
+        assert on_rig.best_abscissa[i] >= 0.0
+    # A cell with such a corner is never vouched for.
+    point = on_rig.grid.points[int(np.flatnonzero(slow)[0])]
+    assert not on_rig.stable_at(point.omega0, point.delta0, point.psi).any()
+    assert "that nothing found stabilises: control off" in on_rig.summary()
+
+
+def test_rig_coordinates_and_groups_are_inverse():
+    for feed in ({"penetration_rate": 5e-3}, {"weight_on_bit": 60e3}):
+        grid = rig_grid(table1(), Axis("rotary_speed", (14.0, 20.0)), rock_strength=80e6, **feed)
+        places = np.array([[15.0, next(iter(feed.values())), 7e7], [19.0, 50e3, 9e7]])
+        if "penetration_rate" in feed:
+            places[1, 1] = 8e-3
+        back = grid.locate(*grid.groups(places).T)
+        assert back == pytest.approx(places, rel=1e-12)
+
+
+def test_a_worker_more_changes_nothing(small):
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        again = table(small.grid, "case1", executor=pool)
+    assert np.array_equal(again.gains, small.gains)
+    assert np.array_equal(again.cells.spectral_abscissa, small.cells.spectral_abscissa)
+
+
+def test_one_node_and_three_axes():
+    single = table(dimensionless_grid(10.0, 1.75, 14.0), "p")
+    assert single.jump == (0.0, None)
+    assert (
+        single.spectral_abscissa[0] == design(OperatingPoint(10, 1.75, 14), "p").spectral_abscissa
+    )
+    cube = table(
+        dimensionless_grid(
+            Axis("omega0", (9.0, 10.0)), Axis("delta0", (1.0, 2.0)), Axis("psi", (14.0, 18.0))
+        ),
+        "p",
+    )
+    corners = list(itertools.product((9.0, 10.0), (1.0, 2.0), (14.0, 18.0)))
+    assert [(p.omega0, p.delta0, p.psi) for p in cube.grid.points] == corners
+    middle = cube.gains_at(9.5, 1.5, 16.0)[0].item()
+    assert middle == pytest.approx(cube.gains.mean(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "count"), [(4, 24, 1), (4, 4, 3), (5, 4, 3), (4, math.inf, 3), (1, 2, 10**9)]
+)
+def test_bad_axes(low, high, count):
+    with pytest.raises(InputError):
+        linear_axis("omega0", low, high, count)
+
+
+def test_bad_arguments(small):
+    for wrong in ({"give_up": 0.95}, {"fallback": "nearest"}, {"seed": -1}):
+        with pytest.raises(InputError):
+            table(small.grid, "case1", **wrong)
+
+
+def test_figure_shows_gains_and_abscissa(on_rig):
+    figure = on_rig.plot()
+    titles = [ax.get_title() for ax in figure.axes]
+    assert {"K1_1", "K2_2", "α"} <= set(titles)
+    shown = next(ax for ax in figure.axes if ax.get_title() == "α")
+    data = shown.collections[0].get_array()
+    drawn = np.sort(np.ravel(data)).tolist()
+    assert drawn == pytest.approx(np.sort(on_rig.spectral_abscissa).tolist())

@@ -1,0 +1,20 @@
+"""Every example runs, and shows the numbers it is about."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SHOWN = {
+    "two_designs.py": ["-0.8119", "-1.39"],
+    "own_friction_law.py": ["α = -0.0028", "α = +0.4941", "stable=True"],
+}
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+def test_example_runs(path, capsys):
+    runpy.run_path(str(path), run_name="__main__")
+    printed = capsys.readouterr().out
+    for text in SHOWN[path.name]:
+        assert text in printed
