@@ -218,6 +218,15 @@ def test_public_names_are_all_there():
         drillctrl.invented  # noqa: B018
 
 
+def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("DRILLCTRL_CACHE", str(tmp_path))
+    for arguments in (["--rtol", "-1"], ["--initial", "dtheta=-20"], ["--model", "magic"]):
+        code, out, err = run(capsys, "simulate", "--delta0", 2.5, *arguments)
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+        assert "compiling" not in err
+
+
 def test_an_objective_and_a_requirement_on_the_command_line(capsys):
     point = ["design", "--structure", "case1", "--json"]
     _, exact, _ = run(capsys, *point)

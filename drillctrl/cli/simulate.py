@@ -77,6 +77,7 @@ def simulate_command(
     from drillctrl.simulation.build import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
+    from drillctrl.simulation.run import checked_run
 
     if out is not None:
         check_export_path(out)
@@ -92,13 +93,15 @@ def simulate_command(
         controller = Controller(structure, gains[0], gains[1], activation=activation)
     elif k1 is not None or k2 is not None:
         raise InputError("--structure", "(missing)", "given together with gains")
+    start = read_initial(initial)
+    checked_run(groups, duration=duration, initial=start, model=model, cutting=cutting, rtol=rtol)
     if not is_compiled():
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     run = simulate(
         groups,
         controller,
         duration=duration,
-        initial=read_initial(initial),
+        initial=start,
         model=model,
         cutting=cutting,
         rtol=rtol,

@@ -12,11 +12,59 @@ from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.setup import FIRST_ROOM, begin, resized, settings_for
+from drillctrl.simulation.setup import FIRST_ROOM, begin, check_start, resized, settings_for
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
 LONGEST = 1e6
+
+
+def checked_run(
+    point: OperatingPoint,
+    scenario: Scenario | None = None,
+    *,
+    duration: float,
+    initial: Mapping[str, float] | None = None,
+    model: str = "nonlinear",
+    cutting: str = "multiple",
+    rtol: float = 1e-8,
+    atol: float | None = None,
+    max_step: float = math.inf,
+    max_steps: int = 1_000_000,
+) -> tuple[Scenario, float, float, float, int]:
+    """Return scenario, duration, tolerances and step limit of a run, checked.
+
+    Nothing is compiled here, so that bad input is refused before the wait for the compiler.
+
+    Parameters
+    ----------
+    point, scenario, duration, initial, model, cutting, rtol, atol, max_step, max_steps
+        As in `simulate`.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
+    """
+    duration = checked_number("duration", duration, 0.0, LONGEST, open_low=True)
+    rtol = checked_number("rtol", rtol, 1e-13, 1e-1)
+    atol = checked_number("atol", 1e-2 * rtol if atol is None else atol, 1e-300, 1.0)
+    max_steps = checked_integer("max_steps", max_steps, 1, 100_000_000)
+    if isinstance(max_step, bool) or not isinstance(max_step, int | float) or not max_step > 0.0:
+        raise InputError("max_step", max_step, "positive")
+    if model not in MODELS:
+        raise InputError("model", model, f"one of {', '.join(MODELS)}")
+    if cutting not in CUTTINGS:
+        raise InputError("cutting", cutting, f"one of {', '.join(CUTTINGS)}")
+    if scenario is not None and initial is not None:
+        raise InputError("initial", dict(initial), "left out where there is a scenario")
+    if scenario is None:
+        scenario = Scenario(initial={} if initial is None else dict(initial))
+    linear = model == "linear"
+    if linear and scenario.changes:
+        raise InputError("changes", len(scenario.changes), "left out for the linear model")
+    check_start(point, scenario, linear)
+    return scenario, duration, rtol, atol, max_steps
 
 
 def simulate(
@@ -77,24 +125,19 @@ def simulate(
     cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
     over what it had cut already.
     """
-    duration = checked_number("duration", duration, 0.0, LONGEST, open_low=True)
-    rtol = checked_number("rtol", rtol, 1e-13, 1e-1)
-    atol = checked_number("atol", 1e-2 * rtol if atol is None else atol, 1e-300, 1.0)
-    max_steps = checked_integer("max_steps", max_steps, 1, 100_000_000)
-    if isinstance(max_step, bool) or not isinstance(max_step, int | float) or not max_step > 0.0:
-        raise InputError("max_step", max_step, "positive")
-    if model not in MODELS:
-        raise InputError("model", model, f"one of {', '.join(MODELS)}")
-    if cutting not in CUTTINGS:
-        raise InputError("cutting", cutting, f"one of {', '.join(CUTTINGS)}")
-    if scenario is not None and initial is not None:
-        raise InputError("initial", dict(initial), "left out where there is a scenario")
-    if scenario is None:
-        scenario = Scenario(initial={} if initial is None else dict(initial))
+    scenario, duration, rtol, atol, max_steps = checked_run(
+        point,
+        scenario,
+        duration=duration,
+        initial=initial,
+        model=model,
+        cutting=cutting,
+        rtol=rtol,
+        atol=atol,
+        max_step=max_step,
+        max_steps=max_steps,
+    )
     linear = model == "linear"
-    if linear and scenario.changes:
-        raise InputError("changes", len(scenario.changes), "left out for the linear model")
-
     settings = settings_for(
         point,
         controller,

@@ -148,18 +148,30 @@ def resized(history: Any, room: int, used: int) -> Any:
     return type(history)(*copies)
 
 
+def check_start(point: OperatingPoint, scenario: Scenario, linear: bool) -> None:
+    """Refuse a start that the model does not cover.
+
+    Raises
+    ------
+    InputError
+        If the bit would start turning backwards, or the linear model from rest.
+    """
+    if linear and scenario.start == "rest":
+        raise InputError("start", "rest", "steady for the linear model")
+    kick = scenario.perturbation()[3]
+    low = -point.omega0 if scenario.start == "steady" else 0.0
+    if not linear and kick < low:
+        raise InputError("initial dtheta", kick, f"at least {low:g}: the bit must not turn back")
+
+
 def begin(
     point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool, room: int = FIRST_ROOM
 ) -> March:
     """Return a march that stands at t = 0.
 
     Before t = 0 there is step 0: steady drilling, or flat rock under a bit at rest (which
-    is any motion with constant Z; the delay it implies is that of steady drilling).
-
-    Raises
-    ------
-    InputError
-        If the bit would start turning backwards.
+    is any motion with constant Z; the delay it implies is that of steady drilling). The
+    start has passed `check_start`.
     """
     data, march, switch = kernel("data"), kernel("march"), kernel("switch")
     history = empty_history(room)
@@ -168,16 +180,11 @@ def begin(
     kick = scenario.perturbation()
     y = np.zeros(6)
     if scenario.start == "rest":
-        if linear:
-            raise InputError("start", "rest", "steady for the linear model")
         y[[0, 2]] = branch_functions()[-1](np.array(settings.p)).full().ravel()
         before[data.X : data.X + 2] = y[0] + point.penetration_rate, -point.penetration_rate
         before[data.THETA] = y[2]
         y[[1, 3]] = -point.penetration_rate, -point.omega0
     y[:4] += kick
-    if not linear and point.omega0 + y[3] < 0.0:
-        low = -point.omega0 if scenario.start == "steady" else 0.0
-        raise InputError("initial dtheta", kick[3], f"at least {low:g}: the bit must not turn back")
     history.whole[0, [data.CONTACT, data.PASSES]] = 1
     ints = np.zeros(march.LAG0 + 3, dtype=np.int64)
     reals = np.zeros(5)
