@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
+    from drillctrl.charts.volume import StabilityVolume, stability_volume
     from drillctrl.comparison.comparing import Comparison, compare
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.design_result import Design
@@ -68,6 +70,7 @@ _HOME = {
     "Design": "design_result",
     "Exact": "optimisation.objectives",
     "FeedbackStructure": "feedback",
+    "GainSurface": "charts.discretised",
     "GainTable": "tables.table",
     "Grid": "tables.grid",
     "InputError": "errors",
@@ -79,12 +82,14 @@ _HOME = {
     "RigPoint": "operating_point",
     "Robust": "optimisation.objectives",
     "Root": "spectrum.roots",
+    "RootLocus": "charts.discretised",
     "Scenario": "simulation",
     "SemiDiscrete": "optimisation.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
     "StabilisableChart": "charts.stabilisable",
     "StabilityChart": "charts.stability_chart",
+    "StabilityVolume": "charts.volume",
     "SteadyState": "steady_state",
     "Tie": "feedback",
     "WorstCase": "optimisation.objectives",
@@ -105,6 +110,7 @@ _HOME = {
     "dominant_roots": "spectrum.roots",
     "frequency_response": "transfer",
     "from_control": "interop.plants",
+    "gain_surface": "charts.discretised",
     "intervals_for": "spectrum.comparison",
     "lifted_system": "interop.lifted",
     "linear_axis": "tables.grid",
@@ -122,6 +128,7 @@ _HOME = {
     "real_stability_radius": "robustness.radius",
     "rig_grid": "tables.grid",
     "rig_point_at_weight_on_bit": "steady_state",
+    "root_locus": "charts.discretised",
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
     "save_table": "tables.files",
@@ -133,6 +140,7 @@ _HOME = {
     "spectral_abscissas": "spectrum.batch",
     "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
+    "stability_volume": "charts.volume",
     "steady_state": "steady_state",
     "table": "tables.table",
     "table1": "rig",
@@ -164,6 +172,7 @@ __all__ = [
     "Design",
     "Exact",
     "FeedbackStructure",
+    "GainSurface",
     "GainTable",
     "Grid",
     "InputError",
@@ -175,12 +184,14 @@ __all__ = [
     "RigPoint",
     "Robust",
     "Root",
+    "RootLocus",
     "Scenario",
     "SemiDiscrete",
     "SemiDiscretization",
     "Simulation",
     "StabilisableChart",
     "StabilityChart",
+    "StabilityVolume",
     "SteadyState",
     "Tie",
     "WorstCase",
@@ -201,6 +212,7 @@ __all__ = [
     "dominant_roots",
     "frequency_response",
     "from_control",
+    "gain_surface",
     "intervals_for",
     "lifted_system",
     "linear_axis",
@@ -218,6 +230,7 @@ __all__ = [
     "real_stability_radius",
     "rig_grid",
     "rig_point_at_weight_on_bit",
+    "root_locus",
     "root_sensitivity",
     "save_rig",
     "save_table",
@@ -229,6 +242,7 @@ __all__ = [
     "spectral_abscissas",
     "stabilisable_chart",
     "stability_radius",
+    "stability_volume",
     "steady_state",
     "table",
     "table1",

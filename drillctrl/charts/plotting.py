@@ -29,8 +29,8 @@ def label_axes(ax: Axes, plane: Plane) -> None:
     """Set limits and labels, with rpm and m/h on twin axes where a rig is known."""
     ax.set_xlim(plane.x.low, plane.x.high)
     ax.set_ylim(plane.y.low, plane.y.high)
-    ax.set_xlabel(_axis_text(plane.x))
-    ax.set_ylabel(_axis_text(plane.y))
+    ax.set_xlabel(axis_text(plane.x))
+    ax.set_ylabel(axis_text(plane.y))
     if plane.rig_point is None:
         return
     rig = plane.rig_point.rig
@@ -58,7 +58,8 @@ def _speed_text(plane: Plane) -> str:
     return f"{plane.rig_point.rotary_speed * 30.0 / np.pi:.0f} rpm"
 
 
-def _axis_text(axis: Axis) -> str:
+def axis_text(axis: Axis) -> str:
+    """Return the label of an axis, in words and with its symbol."""
     words = {
         "omega0": "rotary speed $\\omega_0$",
         "delta0": "nominal depth of cut $\\delta_0$",

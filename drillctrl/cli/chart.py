@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.cli.gains import read_bounds, read_gains
-from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
+from drillctrl.cli.output import (
+    check_figure,
+    check_folder,
+    check_json,
+    json_text,
+    write_figure,
+    write_json,
+    writing,
+)
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.charts.stabilisable import StabilisableChart
     from drillctrl.charts.stability_chart import StabilityChart
+    from drillctrl.charts.volume import StabilityVolume
     from drillctrl.operating_point import OperatingPoint, RigPoint
+
+MESH_ENDINGS = (".vtk", ".ply", ".stl")
 
 
 def read_axis(option: str, text: str) -> tuple[str, object, object]:
@@ -63,8 +75,14 @@ def read_axis(option: str, text: str) -> tuple[str, object, object]:
     metavar="GAIN=LOW:HIGH",
     help="With --optimise: for K1, K2 or one gain such as K1_2; may be repeated.",
 )
+@click.option("--z", "z_axis", metavar="NAME=LOW:HIGH", help="A third axis: a volume.")
+@click.option("--slices", type=int, default=101, show_default=True, help="With --z.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.option("--out", metavar="FILE.json", help="Also write that object to a file.")
+@click.option(
+    "--out",
+    metavar="FILE",
+    help="Also write that object to a .json file; with --z also the surface: .vtk, .ply, .stl.",
+)
 @click.option("--plot", metavar="FILE", help="Draw the chart (.png, .svg or .pdf).")
 def chart_command(
     x_axis: str,
@@ -75,6 +93,8 @@ def chart_command(
     level: float,
     optimise: bool,
     bound: tuple[str, ...],
+    z_axis: str | None,
+    slices: int,
     as_json: bool,
     out: str | None,
     plot: str | None,
@@ -92,15 +112,25 @@ def chart_command(
       drillctrl chart --x K1_1=-10:10 --y K2_1=-10:10 --structure case1
       drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
           --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 -2
+      drillctrl chart --z psi=0.1:26 --y delta0=0:5 --out volume.vtk
       drillctrl chart --optimise --structure case1 --x omega0=0:25 --y delta0=0:18
     """
-    check_json(out)
+    if z_axis is None or out is None or Path(out).suffix.lower() not in MESH_ENDINGS:
+        check_json(out)
+    check_folder("--out", out)
     check_figure(plot)
     where = read_point(point)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
     gains = read_gains("K1", k1), read_gains("K2", k2)
-    result: StabilityChart | StabilisableChart
-    if optimise:
+    result: StabilityChart | StabilisableChart | StabilityVolume
+    if z_axis is not None:
+        if optimise or level or bound:
+            raise InputError("--z", z_axis, "left out with --optimise, --bound or --level")
+        result = volume = _volume(where, x, y, z_axis, structure, gains, slices)
+        if out is not None and Path(out).suffix.lower() in MESH_ENDINGS:
+            mesh, out = out, None
+            writing("--out", mesh, lambda: volume.save_mesh(mesh))
+    elif optimise:
         result = _optimised(where, x, y, structure, gains, level, bound)
     else:
         if bound:
@@ -116,6 +146,24 @@ def chart_command(
         assert figure is not None
         write_figure(plot, figure)
     click.echo(json_text(fields) if as_json else result.summary())
+
+
+def _volume(
+    where: OperatingPoint | RigPoint,
+    x: tuple[str, object, object],
+    y: tuple[str, object, object],
+    z_axis: str,
+    structure: str | None,
+    gains: tuple[list[float] | None, ...],
+    slices: int,
+) -> StabilityVolume:
+    from drillctrl.charts.volume import stability_volume
+    from drillctrl.operating_point import RigPoint
+
+    if isinstance(where, RigPoint):
+        raise InputError("--z", z_axis, "given with dimensionless groups, not with --rig")
+    z = read_axis("--z", z_axis)
+    return stability_volume(where, x, y, z, structure, *gains, slices=slices)
 
 
 def _optimised(
