@@ -34,6 +34,8 @@ if TYPE_CHECKING:
         WorstCase,
     )
     from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
+    from drillctrl.reproduction.agreement import Agreement
+    from drillctrl.reproduction.reproducing import reproduce
     from drillctrl.rig import Rig, load_rig, save_rig, table1
     from drillctrl.robustness.margins import delay_margin, parameter_margin, point_margins
     from drillctrl.robustness.radius import (
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
     from drillctrl.transfer import frequency_response, loop_frd, loop_transfer, to_frd
 
 _HOME = {
+    "Agreement": "reproduction.agreement",
     "Axis": "tables.grid",
     "Change": "simulation",
     "Comparison": "comparison.comparing",
@@ -126,6 +129,7 @@ _HOME = {
     "prove_count": "spectrum.proof",
     "pseudospectral_abscissa": "robustness.radius",
     "real_stability_radius": "robustness.radius",
+    "reproduce": "reproduction.reproducing",
     "rig_grid": "tables.grid",
     "rig_point_at_weight_on_bit": "steady_state",
     "root_locus": "charts.discretised",
@@ -164,6 +168,7 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Agreement",
     "Axis",
     "Change",
     "Comparison",
@@ -228,6 +233,7 @@ __all__ = [
     "prove_count",
     "pseudospectral_abscissa",
     "real_stability_radius",
+    "reproduce",
     "rig_grid",
     "rig_point_at_weight_on_bit",
     "root_locus",

@@ -10,6 +10,7 @@ from drillctrl.cli.analyze import analyze_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
+from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.simulate import simulate_command
 from drillctrl.cli.table import table_command
 from drillctrl.errors import InputError
@@ -34,6 +35,7 @@ for _command in (
     compare_command,
     simulate_command,
     table_command,
+    reproduce_command,
 ):
     cli.add_command(_command)
 
