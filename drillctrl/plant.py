@@ -269,10 +269,10 @@ def steady_offsets(c: Coefficients) -> tuple[Expression, Expression]:
 class Plant:
     """A nonlinear plant with one state-dependent delay, as CasADi SX expressions.
 
-    The motion is X' = ``rhs``(X, Xd, τ, u, p), where Xd = X(t − τ) and τ solves
-    ``delay_condition``(X, Xd, τ, p) = 0. All are perturbations of the steady state X = 0,
-    u = 0, τ = ``steady_delay``(p). A user's plant is `dataclasses.replace` of another with
-    some expressions rewritten.
+    The motion is X' = ``rhs``, a function of X, Xd, τ, u and p, where Xd = X(t − τ) and τ
+    solves ``delay_condition`` = 0. All are perturbations of the steady state X = 0, u = 0,
+    τ = ``steady_delay``. A user's plant is `dataclasses.replace` of another with some
+    expressions rewritten.
 
     Attributes
     ----------

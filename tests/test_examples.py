@@ -8,6 +8,9 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHOWN = {
     "two_designs.py": ["-0.8119", "-1.39"],
+    "sticking_at_120_rpm.py": ["axially held 20 %", "settled: True", "torsional stick 0 %"],
+    "sand_to_rock.py": ["α in sand -0.377, in rock -0.377", ": done"],
+    "table_for_the_drive.py": ["vouched for: True", "same after reading: True"],
     "own_friction_law.py": ["α = -0.0028", "α = +0.4941", "stable=True"],
 }
 

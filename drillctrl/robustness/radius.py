@@ -81,7 +81,7 @@ def stability_radius(
     -----
     On the axis the perturbations of all matrices together fill the ball of radius
     ε Σ wi, so ε = min over ω of σ_min(Δ(iω)) / Σ wi (Hinrichsen and Pritchard); with errors
-    of the delays it is the minimum over ω and f of the larger of that and |f − 1| / wτ.
+    of the delays it is the minimum over ω and f of the larger of that and abs(f − 1) / wτ.
     """
     total = float(_weights(system, weights).sum())
     turn = checked_number("delay_weight", delay_weight, 0.0)

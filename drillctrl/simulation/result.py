@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,9 @@ from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.summary import Summary, summarise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FloatArray = npt.NDArray[np.float64]
 Places = npt.NDArray[np.int64]
@@ -283,6 +286,12 @@ class Simulation:
     def summary(self) -> Summary:
         """Figures of the motion over the last quarter of the run."""
         return summarise(self)
+
+    def plot(self) -> Figure:
+        """Draw axial motion, bit speed and control over time; see `plot_motion`."""
+        from drillctrl.simulation.plotting import plot_motion
+
+        return plot_motion(self)
 
     def to_control(self) -> Any:
         """Return the motion as a python-control ``TimeResponseData``."""

@@ -44,8 +44,8 @@ class RootCount:
 def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 
-    For |s| above the Perron bound ρ each eigenvalue of I − M(s)/s turns by less than
-    asin(ρ/|s|), so det Δ(s)/sⁿ stays in the right half-plane beyond ρ/sin(π/2n) and the
+    Where r, the modulus of s, exceeds the Perron bound ρ, each eigenvalue of I − M(s)/s turns
+    by less than asin(ρ/r), so det Δ(s)/sⁿ stays in the right half-plane beyond ρ/sin(π/2n) and the
     contour closes at infinity without further evaluation. Below, steps are halved until
     the logarithmic derivative of det Δ, at both ends, limits the turn, and the turn is what
     it predicts. Roots close to the line, several of them too, make the derivative large on
