@@ -12,7 +12,8 @@ from drillctrl.optimisation.objectives import Robust, SemiDiscrete, WorstCase
 from drillctrl.robustness.margins import ParameterMargin
 from drillctrl.steady_state import steady_state
 
-_SYMBOLS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'"}
+_SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
+_GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
 
 
 def design_summary(design: Design) -> str:
@@ -73,7 +74,7 @@ def _gain_lines(design: Design) -> _Lines:
     structure = design.structure
     if structure is None:
         return []
-    outputs = [_SYMBOLS.get(name, name) for name in structure.outputs]
+    outputs = [_SIGNALS.get(name, name) for name in structure.outputs]
     past = bool(structure.K2_lower.any() or structure.K2_upper.any())
     law = f"u = K1·({', '.join(outputs)})" if len(outputs) > 1 else f"u = K1·{outputs[0]}"
     if past:
@@ -205,9 +206,6 @@ def _boundary_lines(design: Design) -> _Lines:
     return [("", f"no gains within the bounds reach α = {decision.line:.6g} ({where})")]
 
 
-_SYMBOLS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
-
-
 def _margin_text(errors: ParameterMargin) -> str:
     """Return between which multiples of its assumed value a parameter may lie."""
     upper = f"{1.0 + errors.upper:.4g}" + (" (or more)" if errors.upper == errors.limit else "")
@@ -226,7 +224,7 @@ def _robustness_lines(design: Design) -> _Lines:
         longer = longer if math.isinf(margin.longer) else f"{margin.longer:.4g}"
         lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times τ0"))
     for name, errors in (design.point_margins or {}).items():
-        lines.append(("", f"{_SYMBOLS[name]} {_margin_text(errors)}"))
+        lines.append(("", f"{_GROUPS[name]} {_margin_text(errors)}"))
     if off is not None:
         lines.append(
             ("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits")
