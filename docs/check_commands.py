@@ -1,4 +1,4 @@
-"""Run every command and every Python block of the README and the guide as printed."""
+"""Run, as printed, every command and Python block of the README, the guide and the help texts."""
 
 from __future__ import annotations
 
@@ -8,46 +8,72 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md")))
-
-
-def blocks(text: str, language: str) -> list[str]:
-    """Return the fenced blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+BUILT = {"_build", "gallery", "reference"}
+BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def commands(text: str) -> list[str]:
     """Return the lines that call drillctrl, continuation lines joined."""
-    joined = "\n".join(blocks(text, "sh")).replace("\\\n", " ")
-    return [line for line in joined.splitlines() if line.startswith("drillctrl ")]
+    lines = (line.strip() for line in re.sub(r"\\\n\s*", "", text).splitlines())
+    return [line for line in lines if line.startswith("drillctrl ")]
+
+
+def page_jobs(text: str) -> Iterator[tuple[str, str]]:
+    """Yield language and content of what a page shows, in the reader's order.
+
+    Later Python blocks of a page may use what earlier ones define, so they run as one, where
+    the first stands.
+    """
+    blocks = BLOCK.findall(text)
+    python = "\n".join(content for language, content in blocks if language == "python")
+    for language, content in blocks:
+        if language == "sh":
+            yield from (("sh", command) for command in commands(content))
+        elif python:
+            yield "python", python
+            python = ""
+
+
+def sources() -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """Yield each place that shows commands, and what it shows."""
+    pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md")))
+    for page in pages:
+        if not BUILT & set(page.parts):
+            yield str(page.relative_to(ROOT)), list(page_jobs(page.read_text(encoding="utf-8")))
+    from drillctrl.cli import cli
+
+    for name, verb in sorted(cli.commands.items()):
+        examples = commands(verb.help or "")
+        if not examples:
+            raise SystemExit(f"drillctrl {name} --help shows no example")
+        yield f"drillctrl {name} --help", [("sh", command) for command in examples]
 
 
 def main() -> int:
-    """Run everything in an empty folder; return how many failed."""
+    """Run everything, each place in an empty folder; return how many failed."""
     failed = 0
     program = shutil.which("drillctrl", path=str(Path(sys.executable).parent)) or "drillctrl"
-    for page in PAGES:
-        if "_build" in page.parts or "gallery" in page.parts or "reference" in page.parts:
-            continue
-        text = page.read_text(encoding="utf-8")
+    seen: set[str] = set()
+    for place, jobs in sources():
         with tempfile.TemporaryDirectory() as folder:
-            jobs = [
-                (line, ["bash", "-c", line.replace("drillctrl", program, 1)])
-                for line in commands(text)
-            ]
-            # Later blocks of a page may use what earlier ones define.
-            python = "\n".join(blocks(text, "python"))
-            if python:
-                jobs.append(("the Python blocks", [sys.executable, "-c", python]))
-            for name, job in jobs:
+            for language, content in jobs:
+                if language == "sh":
+                    if content in seen:
+                        continue
+                    seen.add(content)
+                    name = content
+                    job = ["bash", "-c", content.replace("drillctrl", program, 1)]
+                else:
+                    name, job = "the Python blocks", [sys.executable, "-c", content]
                 began = time.perf_counter()
                 done = subprocess.run(job, cwd=folder, capture_output=True, text=True, check=False)
                 took = time.perf_counter() - began
                 word = "ok" if done.returncode == 0 else f"FAILED ({done.returncode})"
-                print(f"{page.relative_to(ROOT)}: {name}: {word}, {took:.1f} s", flush=True)
+                print(f"{place}: {name}: {word}, {took:.1f} s", flush=True)
                 if done.returncode:
                     failed += 1
                     print(done.stderr[-2000:])

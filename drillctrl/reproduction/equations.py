@@ -67,13 +67,13 @@ def equations() -> Reproduced:
             + (f", against its Fig. 8 at {', '.join(wrong)}" if wrong else ""),
         ),
         Agreement(
-            "Eqs. 29-31", "size of D for Case 2", "2m + 4", "3m + 4, or 2m + 4 with two "
+            "Eqs. 29, 30", "size of D for Case 2", "2m + 4", "3m + 4, or 2m + 4 with two "
             "delayed signals", MISPRINT,
             "x and θ of the past leave out θ', which Case 2 feeds back late: growth rate "
             f"{whole:.4f} with it, {lacking:.4f} without (paper's gains at F)",
         ),
         Agreement(
-            "Eq. 28", "R = (P − I) A1⁻¹ A2", "always", f"not where δ0 = {singular_depth():.4g}",
+            "Eq. 31", "R = (P − I) A1⁻¹ A2", "always", f"not where δ0 = {singular_depth():.4g}",
             MISPRINT,
             "A1 is singular at nδ0 = 1 + nψ/η², inside the region of interest; the integral exists",
         ),
