@@ -14,6 +14,7 @@ import numpy.typing as npt
 from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.feedback import FeedbackStructure, preset_structure
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.tables.checkpoint import Checkpoint
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import (
@@ -25,7 +26,7 @@ from drillctrl.tables.interpolation import (
     interpolated,
     place,
 )
-from drillctrl.tables.node import NodeTask, check_node
+from drillctrl.tables.node import NodeDesign, NodeTask, check_node
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
 if TYPE_CHECKING:
@@ -219,6 +220,7 @@ def table(
     fallback: str = "off",
     seed: int = 0,
     executor: Executor | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
 ) -> GainTable:
     """Design gains over a grid of operating points, and check them between the nodes.
@@ -242,6 +244,8 @@ def table(
     executor : concurrent.futures.Executor, optional
         Designs the nodes side by side; without it this process does, one after another. The
         table does not depend on it.
+    checkpoint : Checkpoint, optional
+        Finished designs are kept there, and those that it knows are not done again.
     progress : callable, optional
         Called with the name of a stage, nodes done and nodes to do.
 
@@ -265,7 +269,22 @@ def table(
                 progress(stage, done, len(tasks))
             yield result
 
-    designs = design_grid(grid, chosen, seed, lambda work, tasks: run("design", work, tasks))
+    def remembered(
+        work: Callable[[NodeTask], NodeDesign], tasks: Sequence[NodeTask]
+    ) -> Iterable[NodeDesign]:
+        missing = {}
+        for task in tasks:
+            known = checkpoint.find(task) if checkpoint is not None else None
+            if known is not None:
+                yield known
+            else:
+                missing[task.index] = task
+        for design in run("design", work, list(missing.values())):
+            if checkpoint is not None:
+                checkpoint.keep(missing[design.index], design)
+            yield design
+
+    designs = design_grid(grid, chosen, seed, remembered)
     best = np.array([design.spectral_abscissa for design in designs])
     gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
     gains = smooth_gains(grid, chosen, gains, best, share)
