@@ -44,6 +44,8 @@ if TYPE_CHECKING:
         stability_radius,
     )
     from drillctrl.simulation import Change, Controller, Scenario, Simulation, simulate
+    from drillctrl.simulation.energy import band_energy
+    from drillctrl.simulation.orbits import limit_cycle, separation
     from drillctrl.spectrum.batch import spectral_abscissas
     from drillctrl.spectrum.comparison import compare_spectra, intervals_for
     from drillctrl.spectrum.count import count_right_of
@@ -98,6 +100,7 @@ _HOME = {
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
+    "band_energy": "simulation.energy",
     "characteristic_roots": "spectrum.roots",
     "chart": "charts.stability_chart",
     "close_loop": "feedback",
@@ -116,6 +119,7 @@ _HOME = {
     "gain_surface": "charts.discretised",
     "intervals_for": "spectrum.comparison",
     "lifted_system": "interop.lifted",
+    "limit_cycle": "simulation.orbits",
     "linear_axis": "tables.grid",
     "load_rig": "rig",
     "load_table": "tables.files",
@@ -138,6 +142,7 @@ _HOME = {
     "save_table": "tables.files",
     "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
+    "separation": "simulation.orbits",
     "simulate": "simulation",
     "soft_torque": "top_drive",
     "spectral_abscissa": "spectrum.roots",
@@ -202,6 +207,7 @@ __all__ = [
     "WorstCase",
     "analyze",
     "analyze_loop",
+    "band_energy",
     "characteristic_roots",
     "chart",
     "close_loop",
@@ -220,6 +226,7 @@ __all__ = [
     "gain_surface",
     "intervals_for",
     "lifted_system",
+    "limit_cycle",
     "linear_axis",
     "load_rig",
     "load_table",
@@ -242,6 +249,7 @@ __all__ = [
     "save_table",
     "scheduled_controller",
     "semidiscretize",
+    "separation",
     "simulate",
     "soft_torque",
     "spectral_abscissa",
