@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     )
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
     from drillctrl.spectrum.sensitivity import root_sensitivity
-    from drillctrl.steady_state import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.steady_drilling import SteadyState, rig_point_at_weight_on_bit, steady_state
     from drillctrl.tables.files import load_table, save_table
     from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
     from drillctrl.tables.table import GainTable, table
@@ -95,7 +95,7 @@ _HOME = {
     "StabilisableChart": "charts.stabilisable",
     "StabilityChart": "charts.stability_chart",
     "StabilityVolume": "charts.volume",
-    "SteadyState": "steady_state",
+    "SteadyState": "steady_drilling",
     "Tie": "feedback",
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
@@ -135,7 +135,7 @@ _HOME = {
     "real_stability_radius": "robustness.radius",
     "reproduce": "reproduction.reproducing",
     "rig_grid": "tables.grid",
-    "rig_point_at_weight_on_bit": "steady_state",
+    "rig_point_at_weight_on_bit": "steady_drilling",
     "root_locus": "charts.discretised",
     "root_sensitivity": "spectrum.sensitivity",
     "save_rig": "rig",
@@ -150,7 +150,7 @@ _HOME = {
     "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "stability_volume": "charts.volume",
-    "steady_state": "steady_state",
+    "steady_state": "steady_drilling",
     "table": "tables.table",
     "table1": "rig",
     "to_frd": "transfer",

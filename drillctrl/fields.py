@@ -13,7 +13,7 @@ from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import RigPoint
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import Root
-from drillctrl.steady_state import steady_state
+from drillctrl.steady_drilling import steady_state
 
 # Share of the decay rate that the alternative beside a design may lose.
 GIVE_UP = 0.05

@@ -10,7 +10,7 @@ from drillctrl.design_result import Design
 from drillctrl.fields import GIVE_UP, gain_units, has_alternative
 from drillctrl.optimisation.objectives import Robust, SemiDiscrete, WorstCase
 from drillctrl.robustness.margins import ParameterMargin
-from drillctrl.steady_state import steady_state
+from drillctrl.steady_drilling import steady_state
 
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
 _GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}

@@ -13,7 +13,7 @@ from drillctrl.plant import (
     parameter_vector,
     rhs_function,
 )
-from drillctrl.steady_state import rig_parameter_values
+from drillctrl.steady_drilling import rig_parameter_values
 
 from .strategies import points
 

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from drillctrl import InputError, OperatingPoint, RigPoint, load_rig, save_rig, table1
-from drillctrl.steady_state import rig_point_at_weight_on_bit, steady_state
+from drillctrl.steady_drilling import rig_point_at_weight_on_bit, steady_state
 
 from .strategies import points
 

@@ -91,7 +91,7 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     from drillctrl import units
     from drillctrl.operating_point import RigPoint
     from drillctrl.rig import load_rig
-    from drillctrl.steady_state import rig_point_at_weight_on_bit
+    from drillctrl.steady_drilling import rig_point_at_weight_on_bit
 
     for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
         if name not in given:

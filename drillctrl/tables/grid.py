@@ -16,7 +16,7 @@ from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.plant import rig_coefficients, steady_load
 from drillctrl.rig import Rig
 from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.steady_state import rig_parameter_values, rig_point_at_weight_on_bit
+from drillctrl.steady_drilling import rig_parameter_values, rig_point_at_weight_on_bit
 
 MAX_NODES = 1_000_000
 
