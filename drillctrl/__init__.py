@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.axial_feedback import feed
     from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
@@ -114,6 +115,7 @@ _HOME = {
     "dimensionless_grid": "tables.grid",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
+    "feed": "axial_feedback",
     "frequency_response": "transfer",
     "from_control": "interop.plants",
     "gain_surface": "charts.discretised",
@@ -221,6 +223,7 @@ __all__ = [
     "dimensionless_grid",
     "dimensionless_plant",
     "dominant_roots",
+    "feed",
     "frequency_response",
     "from_control",
     "gain_surface",
