@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.errors import InputError
 
@@ -40,6 +41,7 @@ _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
 @click.option("--wob", metavar="'LOW:HIGH:COUNT UNIT'", help="Instead of --rop: '20:80:7 kN'.")
 @click.option("--rock-strength", metavar="'LOW:HIGH:COUNT UNIT'", help="Such as '40:80:5 MPa'.")
 @click.option("--structure", default="case1", show_default=True, help="p, case1, pd or case2.")
+@objective_options
 @click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
 @click.option(
     "--smooth",
@@ -102,6 +104,9 @@ def table_command(
         raise InputError("--smooth", smooth, "a number in [0, 90]")
     if not 1 <= workers <= 1024:
         raise InputError("--workers", workers, "a whole number in [1, 1024]")
+    objective, requirements = read_objective(grid)
+    if requirements:
+        raise InputError("--min-decay, --min-radius, --max-input-gain", "given", "left out here")
     nodes = _read_grid({k: v for k, v in grid.items() if v is not None})
     from drillctrl.tables.checkpoint import Checkpoint
     from drillctrl.tables.files import check_table_path, save_table
@@ -117,6 +122,7 @@ def table_command(
             nodes,
             structure,
             bounds=read_bounds(bound),
+            objective=objective,
             give_up=smooth / 100.0,
             fallback=fallback,
             seed=seed,

@@ -110,7 +110,8 @@ def task_key(task: NodeTask) -> str:
     }
     ties = [dataclasses.astuple(tie) for tie in task.structure.ties]
     known = [gains.tolist() for gains in task.known]
-    text = repr((task.index, dataclasses.astuple(task.point), structure, ties, task.seed, known))
+    point = dataclasses.astuple(task.point)
+    text = repr((task.index, point, structure, ties, task.seed, known, task.objective))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
