@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
+    from drillctrl.axial_feedback import feed
     from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
         stability_radius,
     )
     from drillctrl.simulation import Change, Controller, Scenario, Simulation, simulate
+    from drillctrl.simulation.energy import band_energy
+    from drillctrl.simulation.orbits import limit_cycle, separation
     from drillctrl.spectrum.batch import spectral_abscissas
     from drillctrl.spectrum.comparison import compare_spectra, intervals_for
     from drillctrl.spectrum.count import count_right_of
@@ -98,6 +101,7 @@ _HOME = {
     "WorstCase": "optimisation.objectives",
     "analyze": "designing",
     "analyze_loop": "analysis",
+    "band_energy": "simulation.energy",
     "characteristic_roots": "spectrum.roots",
     "chart": "charts.stability_chart",
     "close_loop": "feedback",
@@ -111,11 +115,13 @@ _HOME = {
     "dimensionless_grid": "tables.grid",
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
+    "feed": "axial_feedback",
     "frequency_response": "transfer",
     "from_control": "interop.plants",
     "gain_surface": "charts.discretised",
     "intervals_for": "spectrum.comparison",
     "lifted_system": "interop.lifted",
+    "limit_cycle": "simulation.orbits",
     "linear_axis": "tables.grid",
     "load_rig": "rig",
     "load_table": "tables.files",
@@ -138,6 +144,7 @@ _HOME = {
     "save_table": "tables.files",
     "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
+    "separation": "simulation.orbits",
     "simulate": "simulation",
     "soft_torque": "top_drive",
     "spectral_abscissa": "spectrum.roots",
@@ -202,6 +209,7 @@ __all__ = [
     "WorstCase",
     "analyze",
     "analyze_loop",
+    "band_energy",
     "characteristic_roots",
     "chart",
     "close_loop",
@@ -215,11 +223,13 @@ __all__ = [
     "dimensionless_grid",
     "dimensionless_plant",
     "dominant_roots",
+    "feed",
     "frequency_response",
     "from_control",
     "gain_surface",
     "intervals_for",
     "lifted_system",
+    "limit_cycle",
     "linear_axis",
     "load_rig",
     "load_table",
@@ -242,6 +252,7 @@ __all__ = [
     "save_table",
     "scheduled_controller",
     "semidiscretize",
+    "separation",
     "simulate",
     "soft_torque",
     "spectral_abscissa",

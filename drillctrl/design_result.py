@@ -36,6 +36,7 @@ from drillctrl.spectrum.characteristic import FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from drillctrl.remedies import Remedy
     from drillctrl.spectrum.proof import Proof
 
 # How far left of a design its explicit boundary is asked for better gains.
@@ -177,6 +178,13 @@ class Design:
         if not self.stable or self.point is None or self.structure is None:
             return None
         return point_margins(self.point, self.structure, self.K1, self.K2, self.physics)
+
+    @functools.cached_property
+    def remedies(self) -> tuple[Remedy, ...]:
+        """What else stabilises the point, if these gains do not; see `remedies.remedies`."""
+        from drillctrl.remedies import remedies
+
+        return remedies(self)
 
     def _perturbed(self) -> dict[str, DelaySystem]:
         return perturbed_plants(self.plant, self.point, self.physics)

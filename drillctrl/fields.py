@@ -48,6 +48,7 @@ def design_fields(design: Design) -> dict[str, Any]:
     if design.optimality is not None:
         fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
         fields["certificate"]["boundary"] = _boundary_fields(design)
+        fields["remedies"] = [remedy.to_dict() for remedy in design.remedies]
         fields["objective"] = _objective_fields(design)
         fields["requirements"] = {
             **dataclasses.asdict(design.requirements),

@@ -146,6 +146,7 @@ def _verdict_lines(design: Design) -> _Lines:
             text += f", next best {best.next_best:.4f}"
         lines.append(("", text))
         lines += _boundary_lines(design)
+        lines += _remedy_lines(design)
     if design.fragility is not None:
         lines += _robustness_lines(design)
     if has_alternative(design):
@@ -210,6 +211,35 @@ def _margin_text(errors: ParameterMargin) -> str:
     """Return between which multiples of its assumed value a parameter may lie."""
     upper = f"{1.0 + errors.upper:.4g}" + (" (or more)" if errors.upper == errors.limit else "")
     return f"between {1.0 + errors.lower:.4g} and {upper} times the assumed"
+
+
+def _remedy_lines(design: Design) -> _Lines:
+    """Say what would stabilise where these gains do not."""
+    if design.stable or design.point is None:
+        return []
+    words = []
+    for remedy in design.remedies:
+        alpha = f"α = {remedy.spectral_abscissa:.4g}"
+        if remedy.kind == "speed":
+            faster = _speed_text(remedy.design)
+            words.append(f"{faster} at this rate of penetration, no feedback: {alpha}")
+        elif remedy.kind == "feed":
+            words.append(f"an axial actuator, structure {remedy.name}: {alpha}")
+        else:
+            words.append(f"structure {remedy.name} within the paper's bounds: {alpha}")
+    if not words:
+        tried = "richer presets, an axial actuator, up to four times the speed"
+        return [("Would stabilise", f"nothing that was tried ({tried})")]
+    return list(zip(["Would stabilise", *[""] * (len(words) - 1)], words, strict=True))
+
+
+def _speed_text(design: Design) -> str:
+    """Return a rotary speed, in rpm where there is a rig."""
+    if design.rig_point is not None:
+        rpm = units.from_si(design.rig_point.rotary_speed, units.ROTARY_SPEED, "rpm")
+        return f"{rpm:.4g} rpm"
+    assert design.point is not None
+    return f"ω0 = {design.point.omega0:.4g}"
 
 
 def _robustness_lines(design: Design) -> _Lines:

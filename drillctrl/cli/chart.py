@@ -113,7 +113,7 @@ def chart_command(
       drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
           --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 -2
       drillctrl chart --z psi=0.1:26 --y delta0=0:5 --out volume.vtk
-      drillctrl chart --optimise --structure case1 --x omega0=0:25 --y delta0=0:18
+      drillctrl chart --optimise --structure p --x omega0=0:25 --y delta0=0:18
     """
     if z_axis is None or out is None or Path(out).suffix.lower() not in MESH_ENDINGS:
         check_json(out)

@@ -6,19 +6,22 @@ import contextlib
 import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.tables.grid import Axis, Grid
-    from drillctrl.tables.table import Progress
+    from drillctrl.tables.table import GainTable, Progress
     from drillctrl.units import Dimension
 
+CONTROLLERS = (".c", ".st")
 _GROUPS = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades")
 _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
 
@@ -38,6 +41,7 @@ _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
 @click.option("--wob", metavar="'LOW:HIGH:COUNT UNIT'", help="Instead of --rop: '20:80:7 kN'.")
 @click.option("--rock-strength", metavar="'LOW:HIGH:COUNT UNIT'", help="Such as '40:80:5 MPa'.")
 @click.option("--structure", default="case1", show_default=True, help="p, case1, pd or case2.")
+@objective_options
 @click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
 @click.option(
     "--smooth",
@@ -54,9 +58,18 @@ _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Design on a Dask cluster, such as tcp://host:8786."
+)
+@click.option("--period", type=float, help="Sampling period of a .c or .st controller.")
+@click.option("--limit", type=float, help="Largest |u| of a .c or .st controller.")
 @click.option("--require-stable", is_flag=True, help="Exit with 3 if a node is not stable.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
-@click.option("--out", type=click.Path(), help="Write FILE.csv, .json, .parquet, .mat or .nc.")
+@click.option(
+    "--out",
+    type=click.Path(),
+    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h) or .st.",
+)
 @click.option("--plot", type=click.Path(), help="Draw gains and α: FILE.png, .svg, .pdf.")
 def table_command(
     structure: str,
@@ -65,6 +78,9 @@ def table_command(
     fallback: str,
     seed: int,
     workers: int,
+    scheduler: str | None,
+    period: float | None,
+    limit: float | None,
     require_stable: bool,
     as_json: bool,
     out: str | None,
@@ -77,6 +93,10 @@ def table_command(
     Examples:
       drillctrl table --omega0 4:24:21 --delta0 0.25:12:16 --psi 14 --out gains.csv
       drillctrl table --rig table1 --speed "140:260:7 rpm" --rop "10:60:6 m/h" --out gains.csv
+      drillctrl table --omega0 8:20:5 --delta0 1:7:4 --out gains.c --period 0.01 --limit 5
+
+    
+    With --out a run that was killed goes on where it was when it is started again.
     """
     check_folder("--out", out)
     check_figure(plot)
@@ -84,25 +104,40 @@ def table_command(
         raise InputError("--smooth", smooth, "a number in [0, 90]")
     if not 1 <= workers <= 1024:
         raise InputError("--workers", workers, "a whole number in [1, 1024]")
+    objective, requirements = read_objective(grid)
+    if requirements:
+        raise InputError("--min-decay, --min-radius, --max-input-gain", "given", "left out here")
     nodes = _read_grid({k: v for k, v in grid.items() if v is not None})
+    from drillctrl.tables.checkpoint import Checkpoint
     from drillctrl.tables.files import check_table_path, save_table
     from drillctrl.tables.table import table
 
-    if out is not None:
+    controller = out is not None and Path(out).suffix.lower() in CONTROLLERS
+    if out is not None and not controller:
         check_table_path(out)
-    with _executor(workers) as executor, _progress() as progress:
+    _check_controller(out, period, limit, controller)
+    checkpoint = None if out is None else Checkpoint(f"{out}.checkpoint")
+    with _executor(workers, scheduler) as executor, _progress() as progress:
         result = table(
             nodes,
             structure,
             bounds=read_bounds(bound),
+            objective=objective,
             give_up=smooth / 100.0,
             fallback=fallback,
             seed=seed,
             executor=executor,
+            checkpoint=checkpoint,
             progress=progress,
         )
-    if out is not None:
+    if out is not None and controller:
+        assert period is not None
+        assert limit is not None
+        writing("--out", out, lambda: _write_controller(result, out, period, limit))
+    elif out is not None:
         writing("--out", out, lambda: save_table(result, out))
+    if checkpoint is not None:
+        checkpoint.remove()
     if plot is not None:
         write_figure(plot, result.plot())
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
@@ -110,16 +145,59 @@ def table_command(
         raise click.exceptions.Exit(3)
 
 
-@contextlib.contextmanager
-def _executor(workers: int) -> Iterator[Executor | None]:
-    if workers == 1:
-        yield None
-        return
-    import multiprocessing
+def _check_controller(
+    out: str | None, period: float | None, limit: float | None, controller: bool
+) -> None:
+    for name, value in (("--period", period), ("--limit", limit)):
+        if controller and value is None:
+            raise InputError(name, "(missing)", f"given for {out}")
+        if not controller and value is not None:
+            raise InputError(name, value, "left out unless --out ends in .c or .st")
 
-    # A forked child would inherit the threads of the linear algebra.
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        yield pool
+
+def _write_controller(result: GainTable, out: str, period: float, limit: float) -> None:
+    path = Path(out)
+    if path.suffix.lower() == ".st":
+        from drillctrl.tables.export_st import export_st
+
+        export_st(result, path, period=period, limit=limit)
+    else:
+        from drillctrl.tables.export_c import export_c
+
+        export_c(result, path.parent, path.stem, period=period, limit=limit)
+
+
+@contextlib.contextmanager
+def _executor(workers: int, scheduler: str | None) -> Iterator[Executor | None]:
+    """Yield what designs nodes side by side: a cluster, processes, or nothing."""
+    if scheduler is not None:
+        with _cluster(scheduler) as executor:
+            yield executor
+    elif workers == 1:
+        yield None
+    else:
+        import multiprocessing
+
+        # A forked child would inherit the threads of the linear algebra.
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+            yield pool
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        import distributed
+    except ImportError:
+        raise InputError(
+            "--scheduler", address, "used with Dask: pip install 'drillctrl[cluster]'"
+        ) from None
+    try:
+        make: Any = distributed.Client
+        client = make(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError("--scheduler", address, f"a scheduler that answers ({error})") from None
+    with client, client.get_executor(pure=False) as executor:
+        yield executor
 
 
 @contextlib.contextmanager

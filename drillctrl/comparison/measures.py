@@ -17,7 +17,6 @@ from drillctrl.transfer import frequency_grid, loop_transfer
 
 Transfer = Callable[[FloatArray], ComplexArray]
 
-SETTLED_WITHIN = 0.02
 MOST_FACTOR = 16.0
 _BASIN_STEPS = 6
 
@@ -141,33 +140,7 @@ def respond(
     )
     motion = run.on_steps(9)
     inputs = max(float(np.abs(motion.axial).max()), float(np.abs(motion.torque).max()))
-    return Response(run, float(np.abs(motion.x).max()), inputs, settling_time(run))
-
-
-def settling_time(run: Simulation, within: float = SETTLED_WITHIN) -> float | None:
-    """Return when |x| and |θ| stay below a share of their largest values.
-
-    Parameters
-    ----------
-    run : Simulation
-        A finished run.
-    within : float
-        The share.
-
-    Returns
-    -------
-    float or None
-        None if the run broke off, or either is still beyond in the last tenth of it.
-    """
-    if run.status != "done":
-        return None
-    motion = run.on_steps(9)
-    last = 0.0
-    for values in (np.abs(motion.x), np.abs(motion.theta)):
-        beyond = np.flatnonzero(values > within * values.max(initial=0.0))
-        if beyond.size:
-            last = max(last, float(motion.times[min(beyond[-1] + 1, values.size - 1)]))
-    return None if last > 0.9 * run.duration else last
+    return Response(run, float(np.abs(motion.x).max()), inputs, run.summary.settling_time)
 
 
 def basin(design: Design, disturbance: Mapping[str, float], duration: float) -> float | None:

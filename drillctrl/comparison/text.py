@@ -92,7 +92,7 @@ def sentences(comparison: Comparison) -> list[str]:
     best, *others = rows
     if not best.design.stable:
         text = "None of these gains stabilises this point"
-        return [f"{text}; feedback to the axial input or a top drive may, see the guide."]
+        return [f"{text}; the summary of a design says what would."]
     mine = best.to_dict()
     found = []
     for other in others:

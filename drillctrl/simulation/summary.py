@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 SETTLED = 1e-3
+SETTLED_WITHIN = 0.02
 RETURNED = 1e-3
 PER_STEP = 9
 MAX_RETURNS = 40
@@ -46,6 +47,8 @@ class Summary:
         Numbers of events and of steps over the whole run.
     elapsed_seconds : float
         Wall time of the integration.
+    settling_time : float or None
+        When |x| and |θ| stay below 2 % of their largest values; see `settling_time`.
     """
 
     settled: bool
@@ -62,6 +65,7 @@ class Summary:
     events: int
     steps: int
     elapsed_seconds: float
+    settling_time: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields by name."""
@@ -98,7 +102,34 @@ def summarise(simulation: Simulation) -> Summary:
         events=len(simulation.events),
         steps=simulation.steps,
         elapsed_seconds=simulation.elapsed_seconds,
+        settling_time=settling_time(simulation),
     )
+
+
+def settling_time(simulation: Simulation, within: float = SETTLED_WITHIN) -> float | None:
+    """Return when |x| and |θ| stay below a share of their largest values.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        A finished run.
+    within : float
+        The share.
+
+    Returns
+    -------
+    float or None
+        None if the run broke off, or either is still beyond in the last tenth of it.
+    """
+    if simulation.status != "done" or simulation.steps == 0:
+        return None
+    motion = simulation.on_steps(PER_STEP)
+    last = 0.0
+    for values in (abs(motion.x), abs(motion.theta)):
+        beyond = np.flatnonzero(values > within * values.max(initial=0.0))
+        if beyond.size:
+            last = max(last, float(motion.times[min(beyond[-1] + 1, values.size - 1)]))
+    return None if last > 0.9 * simulation.duration else last
 
 
 def _share(simulation: Simulation, phase: str, since: float, end: float) -> float:

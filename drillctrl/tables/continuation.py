@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.feedback import FeedbackStructure
+from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.grid import Grid
@@ -22,7 +23,11 @@ _MOST_KNOWN = 4
 
 
 def design_grid(
-    grid: Grid, structure: FeedbackStructure, seed: int, run: Mapper
+    grid: Grid,
+    structure: FeedbackStructure,
+    seed: int,
+    run: Mapper,
+    objective: Objective = EXACT,
 ) -> list[NodeDesign]:
     """Design every node of a grid.
 
@@ -41,6 +46,8 @@ def design_grid(
     run : callable
         ``run(design_node, tasks)`` yields the designs of the tasks, in any order. The result
         does not depend on how: tasks of one wave do not depend on each other.
+    objective : Objective
+        Other than the exact abscissa, each node is designed on its own.
 
     Returns
     -------
@@ -48,6 +55,12 @@ def design_grid(
         In the order of the nodes.
     """
     found: dict[int, NodeDesign] = {}
+    if not isinstance(objective, Exact):
+        alone = [
+            NodeTask(i, point, structure, seed, objective=objective)
+            for i, point in enumerate(grid.points)
+        ]
+        return sorted(run(design_node, alone), key=lambda design: design.index)
     stride = _coarse_stride(grid.shape)
     while stride >= 1:
         chosen = [

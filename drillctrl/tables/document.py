@@ -86,6 +86,7 @@ def to_document(table: GainTable) -> Document:
         "give_up": table.give_up,
         "fallback": table.fallback,
         "seed": table.seed,
+        "objective": table.objective,
         "cells": {
             "modes": list(CELL_NAMES),
             "mode": table.cells.mode.tolist(),
@@ -198,6 +199,7 @@ def _read(document: Document) -> GainTable:
         header["fallback"],
         int(header["seed"]),
         _read_cells(header["cells"], math.prod(cell_shape(grid)), gains.shape[1]),
+        str(header["objective"]),
     )
 
 

@@ -8,10 +8,12 @@ import numpy as np
 
 from drillctrl.analysis import analyze_loop
 from drillctrl.delay_system import plant_system
+from drillctrl.designing import design
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.optimisation.certificate import certify_optimality
 from drillctrl.optimisation.family import loop_family
+from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.optimisation.rounding import hold_multiple_root
 from drillctrl.optimisation.search import EFFORTS, Effort, global_search
 from drillctrl.spectrum.characteristic import FloatArray
@@ -42,6 +44,8 @@ class NodeTask:
         Of the starting points.
     known : tuple of array, (k,)
         Gains of neighbours; without any the whole box is searched.
+    objective : Objective
+        What is minimised; only the exact abscissa begins at ``known``.
     """
 
     index: int
@@ -49,6 +53,7 @@ class NodeTask:
     structure: FeedbackStructure
     seed: int
     known: tuple[FloatArray, ...] = ()
+    objective: Objective = EXACT
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +83,8 @@ class NodeDesign:
 
 def design_node(task: NodeTask) -> NodeDesign:
     """Search for the best gains at a node, from its neighbours' if there are any."""
+    if not isinstance(task.objective, Exact):
+        return _design_otherwise(task)
     family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
     count = min(task.structure.lower.size, 4)
     effort = _CONTINUED.get(count) if task.known else EFFORTS.get(count)
@@ -91,6 +98,19 @@ def design_node(task: NodeTask) -> NodeDesign:
         analyze_loop(family.loop(gains)).spectral_abscissa,
         certify_optimality(family, gains, search).stationarity,
         tuple(basin.gains for basin in search.basins[1:_KEPT]),
+    )
+
+
+def _design_otherwise(task: NodeTask) -> NodeDesign:
+    """Minimise another objective than the abscissa, by the same route as `design`."""
+    result = design(task.point, task.structure, objective=task.objective, seed=task.seed)
+    assert result.optimality is not None
+    return NodeDesign(
+        task.index,
+        task.structure.vector(result.K1, result.K2),
+        result.spectral_abscissa,
+        result.optimality.stationarity,
+        (),
     )
 
 

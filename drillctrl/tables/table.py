@@ -13,7 +13,9 @@ import numpy.typing as npt
 
 from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.feedback import FeedbackStructure, preset_structure
+from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.tables.checkpoint import Checkpoint
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import (
@@ -25,7 +27,7 @@ from drillctrl.tables.interpolation import (
     interpolated,
     place,
 )
-from drillctrl.tables.node import NodeTask, check_node
+from drillctrl.tables.node import NodeDesign, NodeTask, check_node
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
 if TYPE_CHECKING:
@@ -62,6 +64,8 @@ class GainTable:
         Of the searches.
     cells : Cells
         What is known between the nodes.
+    objective : str
+        What was minimised at each node.
     """
 
     grid: Grid
@@ -75,6 +79,7 @@ class GainTable:
     fallback: str
     seed: int
     cells: Cells
+    objective: str = repr(EXACT)
 
     @property
     def entries(self) -> FloatArray:
@@ -171,6 +176,8 @@ class GainTable:
             for axis in self.grid.axes
         ]
         lost = "lowest α at each node"
+        if self.objective != repr(EXACT):
+            lost = f"{self.objective} at each node"
         if self.give_up:
             lost = f"smoothest found with at most {100 * self.give_up:g} % of the decay given up"
         lines = [
@@ -215,10 +222,12 @@ def table(
     structure: str | FeedbackStructure = "case1",
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    objective: Objective = EXACT,
     give_up: float = 0.0,
     fallback: str = "off",
     seed: int = 0,
     executor: Executor | None = None,
+    checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
 ) -> GainTable:
     """Design gains over a grid of operating points, and check them between the nodes.
@@ -231,6 +240,8 @@ def table(
         As for `design`.
     bounds : mapping, optional
         As for `design`.
+    objective : Exact, SemiDiscrete, WorstCase or Robust
+        As for `design`. Nodes are stable or not by α whatever is minimised.
     give_up : float
         0: the lowest α found at each node. Up to 0.9: the smoothest table found that keeps
         α ≤ (1 − give_up) times the best at every node.
@@ -242,6 +253,8 @@ def table(
     executor : concurrent.futures.Executor, optional
         Designs the nodes side by side; without it this process does, one after another. The
         table does not depend on it.
+    checkpoint : Checkpoint, optional
+        Finished designs are kept there, and those that it knows are not done again.
     progress : callable, optional
         Called with the name of a stage, nodes done and nodes to do.
 
@@ -254,6 +267,8 @@ def table(
     chosen = chosen.with_bounds(bounds or {})
     share = checked_number("give_up", give_up, 0.0, 0.9)
     checked_integer("seed", seed, 0, 2**63 - 1)
+    if share and not isinstance(objective, Exact):
+        raise InputError("give_up", share, f"0 with objective {objective.name}")
     if fallback not in FALLBACKS:
         raise InputError("fallback", fallback, f"one of {', '.join(FALLBACKS)}")
 
@@ -265,7 +280,22 @@ def table(
                 progress(stage, done, len(tasks))
             yield result
 
-    designs = design_grid(grid, chosen, seed, lambda work, tasks: run("design", work, tasks))
+    def remembered(
+        work: Callable[[NodeTask], NodeDesign], tasks: Sequence[NodeTask]
+    ) -> Iterable[NodeDesign]:
+        missing = {}
+        for task in tasks:
+            known = checkpoint.find(task) if checkpoint is not None else None
+            if known is not None:
+                yield known
+            else:
+                missing[task.index] = task
+        for design in run("design", work, list(missing.values())):
+            if checkpoint is not None:
+                checkpoint.keep(missing[design.index], design)
+            yield design
+
+    designs = design_grid(grid, chosen, seed, remembered, objective)
     best = np.array([design.spectral_abscissa for design in designs])
     gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
     gains = smooth_gains(grid, chosen, gains, best, share)
@@ -286,6 +316,7 @@ def table(
         fallback,
         seed,
         check_cells(grid, chosen, gains, stable),
+        repr(objective),
     )
 
 

@@ -20,8 +20,9 @@ from drillctrl import (
     preset_structure,
     spectral_abscissa,
 )
-from drillctrl.comparison.measures import loop_margins, settling_time
+from drillctrl.comparison.measures import loop_margins
 from drillctrl.simulation import simulate
+from drillctrl.simulation.summary import settling_time
 
 PAPER = [
     ("paper p", "p", [-1.55], None),

@@ -7,6 +7,7 @@ import pytest
 from drillctrl import (
     InputError,
     OperatingPoint,
+    WorstCase,
     analyze,
     design,
     dimensionless_grid,
@@ -135,3 +136,19 @@ def test_figure_shows_gains_and_abscissa(on_rig):
     data = shown.collections[0].get_array()
     drawn = np.sort(np.ravel(data)).tolist()
     assert drawn == pytest.approx(np.sort(on_rig.spectral_abscissa).tolist())
+
+
+def test_another_objective_is_designed_for_at_each_node():
+    grid = dimensionless_grid(linear_axis("omega0", 9, 11, 2), 2.0, 14.0)
+    worst = WorstCase(psi=0.2)
+    found = table(grid, "case1", objective=worst)
+    best = table(grid, "case1")
+    for i, point in enumerate(grid.points):
+        alone = design(point, "case1", objective=worst)
+        assert found.entries[i] == pytest.approx([alone.K1.item(), alone.K2.item()], abs=1e-12)
+    # What is gained off the node costs decay on it.
+    assert (found.spectral_abscissa > best.spectral_abscissa).all()
+    assert found.stable.all()
+    assert "WorstCase" in found.summary()
+    with pytest.raises(InputError, match="give_up"):
+        table(grid, "case1", objective=worst, give_up=0.1)

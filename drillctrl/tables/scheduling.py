@@ -1,0 +1,92 @@
+"""A table's gains over the course of a simulated scenario."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import checked_number
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.scenario import Scenario
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.tables.table import GainTable
+
+Entry = tuple[float, npt.ArrayLike, npt.ArrayLike | None]
+
+
+def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> FloatArray:
+    """Return ω0, δ0 and ψ as the top end and the rock impose them, (q, 3)."""
+    knots: list[tuple[float, ...]] = [(0.0, point.omega0, point.penetration_rate, point.psi)]
+    for change in scenario.changes:
+        before = knots[-1][1:]
+        after = tuple(
+            old if new is None else new
+            for old, new in zip(
+                before, (change.omega0, change.penetration_rate, change.psi), strict=True
+            )
+        )
+        # A step is a ramp too short to notice.
+        end = change.time + max(change.duration, 1e-9)
+        knots += [(change.time, *before), (end, *after)]
+    table = np.array(knots)
+    omega0, rate, psi = (np.interp(times, table[:, 0], table[:, i]) for i in (1, 2, 3))
+    return np.column_stack([omega0, rate / omega0, psi])
+
+
+def scheduled(
+    table: GainTable,
+    point: OperatingPoint,
+    scenario: Scenario,
+    *,
+    interval: float = 0.5,
+    late: float = 0.0,
+    duration: float = 1e4,
+    **options: float | None,
+) -> Controller:
+    """Return a controller whose gains follow a table through a scenario.
+
+    Parameters
+    ----------
+    table : GainTable
+        Looked up at the operating point that the top end and the rock impose.
+    point : OperatingPoint
+        Where the scenario starts.
+    scenario : Scenario
+        With its changes.
+    interval : float
+        How often gains are looked up while something changes.
+    late : float
+        By how much the controller learns of a change too late.
+    duration : float
+        Changes after this are left out.
+    **options
+        Of `Controller`: activation, period, limit and the rest.
+
+    Returns
+    -------
+    Controller
+        With the gains of the start and a schedule of later ones.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+    """
+    spacing = checked_number("interval", interval, 0.0, 1e6, open_low=True)
+    delay = checked_number("late", late, 0.0, 1e6)
+    times: list[float] = []
+    for change in scenario.changes:
+        end = change.time + change.duration
+        count = max(1, int(np.ceil(change.duration / spacing)))
+        times += [t for t in np.linspace(change.time, end, count + 1)[1:] if t <= duration]
+        if change.duration == 0.0:
+            # Looked up just behind the step.
+            times[-1:] = [change.time]
+    instants = np.array([0.0, *times])
+    places = course(point, scenario, instants + 2e-9)
+    K1, K2 = table.gains_at(*places.T)
+    entries: tuple[Entry, ...] = tuple(
+        (float(t) + delay, K1[i + 1], K2[i + 1]) for i, t in enumerate(times)
+    )
+    return Controller(table.structure, K1[0], K2[0], schedule=entries, **options)  # type: ignore[arg-type]

@@ -1,0 +1,117 @@
+import re
+
+import numpy as np
+import pytest
+from blark.parse import parse_source_code
+
+from drillctrl import Controller, InputError, OperatingPoint, simulate
+from drillctrl.tables.export_st import export_st
+
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+PERIOD, LIMIT = POINT.delay / 16, 3.0
+WORDS = {
+    "AND": "and",
+    "OR": "or",
+    "NOT": "not",
+    "TRUE": "True",
+    "FALSE": "False",
+    "LREAL_TO_DINT": "int",
+    "TRUNC": "int",
+}
+
+
+def to_python(text):
+    """Turn the block into a Python function of a dict of variables.
+
+    A translation line by line, good for the few statements that the exporter writes.
+    """
+    declared, body = text.split("END_VAR\n\nNewest", 1)
+    declared = re.sub(r"\(\*.*?\*\)", "", declared, flags=re.DOTALL)
+    start = {}
+    for name, last, values in re.findall(
+        r"(\w+) : ARRAY\[0\.\.(\d+)\] OF \w+(?: := \[(.*?)\])?;", declared, re.DOTALL
+    ):
+        given = [float(v) for v in values.split(",")] if values else [0.0] * (int(last) + 1)
+        start[name] = [int(v) for v in given] if name == "CellMode" else given
+    for name, kind, value in re.findall(r"(\w+) : (L?REAL|DINT|BOOL)(?: := ([^;\[]+))?;", declared):
+        start[name] = {"DINT": int, "BOOL": bool}.get(kind, float)(float(value or 0))
+    lines, depth = [], 1
+    for raw in ("Newest" + body).splitlines():
+        line = raw.strip().rstrip(";")
+        line = re.sub(r"(?<![:<>])=", "==", line).replace(":=", "=").replace(" MOD ", " % ")
+        for word, other in WORDS.items():
+            line = re.sub(rf"\b{word}\b", other, line)
+        if line in ("END_IF", "END_FOR", "END_FUNCTION_BLOCK", ""):
+            depth -= line.startswith("END_") and line != "END_FUNCTION_BLOCK"
+            continue
+        loop = re.fullmatch(r"FOR (\w+) = (.*) TO (.*) DO", line)
+        if loop:
+            line = f"for {loop[1]} in range({loop[2]}, {loop[3]} + 1):"
+        line = re.sub(r"^IF (.*) THEN$", r"if \1:", line)
+        if line.startswith("ELSIF ") or line == "ELSE":
+            depth -= 1
+            line = re.sub(r"^ELSIF (.*) THEN$", r"elif \1:", line).replace("ELSE", "else:")
+        lines.append("    " * depth + line)
+        depth += line.endswith(":")
+    names = ", ".join(start)
+    unpack = "".join(f"    {name} = v[{name!r}]\n" for name in start)
+    code = (
+        f"def step(v):\n{unpack}"
+        + "\n".join(lines)
+        + f"\n    v.update(zip({list(start)}, [{names}]))\n"
+    )
+    space = {}
+    exec(code, space)
+    return space["step"], start
+
+
+def test_the_block_parses_and_gives_the_simulators_command(small, tmp_path):
+    path = export_st(small, tmp_path / "drill.st", period=PERIOD, limit=LIMIT)
+    text = path.read_text()
+    assert parse_source_code(text).exception is None
+    step, state = to_python(text)
+    K1, K2 = small.gains_at(10.0, 2.5, 14.0)
+    start = 100.0
+    control = Controller("case1", K1[0], K2[0], activation=start, period=PERIOD, limit=LIMIT)
+    run = simulate(POINT, control, duration=130.0, initial={"dx": 1.0, "dtheta": 1.0})
+    samples = np.arange(-100, int(29.0 / PERIOD))
+    theta = run.at(start + samples * PERIOD).theta
+    held = run.at(start + (samples + 0.5) * PERIOD).torque
+    commanded = []
+    for k, y in zip(samples.tolist(), theta.tolist(), strict=True):
+        state.update(Y=[y], Place=[10.0, 2.5, 14.0], Delay=POINT.delay, On=k >= 0)
+        step(state)
+        commanded.append(state["U"])
+    assert np.abs(held - commanded).max() < 1e-12
+    assert state["Vouched"]
+    assert any(event.name == "stick" for event in run.events)
+
+
+def test_lookup_equals_python(small, on_rig, tmp_path):
+    rng = np.random.default_rng(4)
+    for table in (small, on_rig):
+        text = export_st(table, tmp_path / "t.st", period=0.5, limit=1e6).read_text()
+        assert parse_source_code(text).exception is None
+        step, state = to_python(text)
+        low, high = table.grid.coordinates.min(axis=0), table.grid.coordinates.max(axis=0)
+        places = low + (high - low) * rng.uniform(-0.3, 1.3, (60, 3))
+        places[:, 2] = low[2]
+        for place in places[(places > 0).all(axis=1)]:
+            groups = table.grid.groups(place[None])[0]
+            K1, K2 = table.gains_at(*groups)
+            expected = np.array([*K1.ravel(), *K2.ravel()])
+            rig = table.grid.rig
+            if rig is not None:
+                expected *= rig.torsional_stiffness * np.array([1.0, rig.time_scale] * 2)
+            count = len(table.structure.outputs)
+            state.update(Y=[0.0] * count, Place=place.tolist(), Delay=0.1, On=False)
+            step(state)
+            assert state["Gains"] == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
+            assert state["Vouched"] == table.stable_at(*groups)[0]
+
+
+def test_bad_input_is_refused(small, tmp_path):
+    for wrong in ({"name": "1x"}, {"period": 0.0}, {"limit": -1.0}):
+        with pytest.raises(InputError):
+            export_st(small, tmp_path / "t.st", **{"period": 0.1, "limit": 1.0, **wrong})
+    assert not list(tmp_path.iterdir())

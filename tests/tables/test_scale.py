@@ -1,0 +1,129 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from drillctrl import InputError, cli, dimensionless_grid, linear_axis, table
+from drillctrl.tables.checkpoint import Checkpoint
+
+GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
+SLOW = ["table", "--omega0", "6:22:6", "--delta0", "1:11:5", "--structure", "case2", "--out"]
+
+
+def same(one, other):
+    return (one.gains == other.gains).all() and (
+        one.spectral_abscissa == other.spectral_abscissa
+    ).all()
+
+
+def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
+    path = tmp_path / "half.checkpoint"
+    first = Checkpoint(path)
+    assert same(table(GRID, "case1", checkpoint=first), small)
+    first.close()
+    lines = path.read_bytes().splitlines(keepends=True)
+    # What a kill leaves: some lines, and one cut short.
+    path.write_bytes(b"".join(lines[:4]) + lines[4][:37])
+    seen = []
+    second = Checkpoint(path)
+    again = table(GRID, "case1", checkpoint=second, progress=lambda *a: seen.append(a))
+    second.close()
+    assert same(again, small)
+    assert sum(stage == "design" for stage, _, _ in seen) == len(lines) - 4
+    assert path.read_bytes().count(b"\n") == len(lines)
+    # Another seed is another task.
+    third = Checkpoint(path)
+    fresh = []
+    table(GRID, "case1", seed=1, checkpoint=third, progress=lambda *a: fresh.append(a))
+    assert sum(stage == "design" for stage, _, _ in fresh) >= 9
+    third.remove()
+    assert not path.exists()
+
+
+def test_rubbish_in_a_checkpoint_is_dropped(tmp_path):
+    path = tmp_path / "bad.checkpoint"
+    path.write_bytes(b'{"task": 1}\nnot json\n')
+    Checkpoint(path).close()
+    assert path.read_bytes() == b""
+    with pytest.raises(InputError, match="checkpoint"):
+        Checkpoint(tmp_path / "no" / "folder")
+
+
+def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(tmp_path):
+    whole, broken = tmp_path / "whole.csv", tmp_path / "broken.csv"
+    program = [sys.executable, "-m", "drillctrl", *SLOW]
+    subprocess.run([*program, str(whole)], check=True, capture_output=True)
+    checkpoint = tmp_path / "broken.csv.checkpoint"
+    run = subprocess.Popen([*program, str(broken)], stdout=subprocess.DEVNULL)
+    while not checkpoint.exists() or checkpoint.read_bytes().count(b"\n") < 5:
+        assert run.poll() is None
+        time.sleep(0.02)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    assert not broken.exists()
+    assert checkpoint.exists()
+    subprocess.run([*program, str(broken)], check=True, capture_output=True)
+    assert broken.read_bytes() == whole.read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {"whole.csv", "broken.csv"}
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with (
+        distributed.LocalCluster(
+            **options, host="127.0.0.1", local_directory=str(tmp_path)
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        processes = list(client.run(os.getpid).values())
+        killed = []
+
+        def kill_once(stage, done, total):
+            if done == 2 and not killed:
+                killed.append(processes[0])
+                os.kill(processes[0], signal.SIGKILL)
+
+        found = table(GRID, "case1", executor=client.get_executor(pure=False), progress=kill_once)
+    assert killed
+    assert same(found, small)
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["table", "--omega0", "8:14:2", "--delta0", "1:6:2", "--scheduler", "nowhere"])
+    captured = capsys.readouterr()
+    assert stop.value.code == 2
+    assert captured.err.startswith("drillctrl: --scheduler = nowhere")
+    assert captured.err.count("\n") == 1
+
+
+def test_controllers_on_the_command_line(capsys, tmp_path):
+    base = ["table", "--omega0", "8:14:2", "--delta0", "1:6:2"]
+    for name in ("gains.c", "gains.st"):
+        out = str(tmp_path / name)
+        with pytest.raises(SystemExit) as stop:
+            cli.main([*base, "--out", out, "--period", "0.01", "--limit", "5"])
+        assert stop.value.code == 0
+        with pytest.raises(SystemExit) as stop:
+            cli.main([*base, "--out", out])
+        assert stop.value.code == 2
+    assert {p.name for p in tmp_path.iterdir()} == {"gains.c", "gains.h", "gains.st"}
+    assert "--period = (missing)" in capsys.readouterr().err
+
+
+def test_the_result_does_not_depend_on_the_order_of_nodes(small):
+    class Backwards:
+        def submit(self, work, *arguments):
+            from concurrent.futures import Future
+
+            future = Future()
+            future.set_result(list(reversed(work(*arguments))))
+            return future
+
+    assert same(table(GRID, "case1", executor=Backwards()), small)
+    assert np.isfinite(small.gains).all()
