@@ -139,7 +139,10 @@ def global_search(
         # Another descent into the same corner teaches nothing.
         seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
         if len(sharp) == effort.sharpened or seen:
-            rest.append(basin)
+            # Exact: near a multiple root the collocation promises more than there is.
+            exact = spectral_abscissa(family.loop(basin.gains))
+            rest.append(Basin(basin.gains, exact, ()))
+            evaluations += 1
             continue
         better, used = _settle(family, basin, effort)
         evaluations += used

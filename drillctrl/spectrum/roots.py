@@ -34,6 +34,10 @@ MULTIPLICITY_TOLERANCE = 1e-8
 ROUNDING_TOLERANCE = 32 * EPSILON
 _CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 _CLOSE = 0.2
+# How far left of the rightmost start, relative, others are polished with it: a cluster, a
+# root that stands alone.
+_WIDE = 0.1
+_NARROW = 1e-3
 
 
 @dataclass(frozen=True)
@@ -185,13 +189,17 @@ def _gather(
                     break
             floor = float(inside.real.max()) - depth
         # Starting values of a k-fold root are off by the k-th root of the error.
-        slack = 0.02
+        slack = _WIDE
         if depth == 0.0 and line is None:
             top = inside[int(np.argmax(inside.real))]
             near = int((np.abs(inside - top) < _CLOSE * (1.0 + abs(top))).sum())
-            slack = 1e-3 if near == 1 and not 0.0 < top.imag < _CLOSE else slack
+            slack = _NARROW if near == 1 and not 0.0 < top.imag < _CLOSE else slack
         start = inside[inside.real >= floor - slack * (1.0 + np.abs(inside))]
         s, done = polish(system, start)
+        if slack == _NARROW and (np.abs(s - start) > _NARROW * (1.0 + np.abs(start))).any():
+            # A simple root starts far nearer than that: it has neighbours that pull.
+            start = inside[inside.real >= floor - _WIDE * (1.0 + np.abs(inside))]
+            s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
         if (done & ~strayed).all() or degree > MAX_DEGREE // 2:
             order = np.argsort(-s.real, kind="stable")

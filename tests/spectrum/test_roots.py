@@ -197,3 +197,16 @@ def test_roots_far_left_of_the_first_line_are_found():
     system = DelaySystem([[0.0]], ([[-1.0]],), (0.5,), [[1.0]], [[1.0]])
     exact = lambertw(-0.5) / 0.5
     assert spectral_abscissa(system) == pytest.approx(exact.real, abs=1e-12)
+
+
+def test_four_roots_near_each_other_are_not_taken_for_one():
+    """Close to a quadruple root at -1.816 the members lie up to 0.04 apart."""
+    point = OperatingPoint(13.411764705882353, 5.8076923076923075, 14.0)
+    structure = preset_structure("case2")
+    loop = close_loop(
+        plant_system(point), structure, [-9.93640766, -2.08057287], [7.72228519, 1.49886138]
+    )
+    alpha = spectral_abscissa(loop)
+    # Counting knows nothing of how roots are found: none right of α, some just left of it.
+    assert count_right_of(loop, alpha + 2e-4).count == 0
+    assert count_right_of(loop, alpha - 2e-4).count >= 1
