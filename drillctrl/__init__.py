@@ -44,7 +44,7 @@ if TYPE_CHECKING:
         real_stability_radius,
         stability_radius,
     )
-    from drillctrl.simulation import Change, Controller, Scenario, Simulation, simulate
+    from drillctrl.simulation import Change, Controller, Past, Scenario, Simulation, simulate
     from drillctrl.simulation.energy import band_energy
     from drillctrl.simulation.orbits import limit_cycle, separation
     from drillctrl.spectrum.batch import spectral_abscissas
@@ -82,6 +82,7 @@ _HOME = {
     "InputError": "errors",
     "LoopAnalysis": "analysis",
     "OperatingPoint": "operating_point",
+    "Past": "simulation",
     "Plant": "plant",
     "Requirements": "optimisation.objectives",
     "Rig": "rig",
@@ -190,6 +191,7 @@ __all__ = [
     "InputError",
     "LoopAnalysis",
     "OperatingPoint",
+    "Past",
     "Plant",
     "Requirements",
     "Rig",

@@ -14,6 +14,7 @@ from drillctrl.errors import InputError
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.past import Past, past_of
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.summary import Summary, summarise
 
@@ -50,7 +51,8 @@ class Event(NamedTuple):
     name : str
         ``"stick"``, ``"release"``, ``"reverse"`` (torsion); ``"hold"``, ``"advance"``,
         ``"lift"`` (Z' becomes 0, positive, negative in contact); ``"loss"``, ``"return"``
-        (of contact).
+        (of contact); ``"saturate"``, ``"desaturate"`` (an input meets or leaves its limit, or
+        an actuator its limit of rate; a sampled controller has no such instants).
     """
 
     time: float
@@ -145,6 +147,7 @@ class Simulation:
     elapsed_seconds: float
     _settings: Mapping[str, Any] = field(repr=False)
     _history: Mapping[str, Any] = field(repr=False)
+    _first: int = field(default=1, repr=False)
 
     @functools.cached_property
     def _compiled(self) -> tuple[Any, Any]:
@@ -156,18 +159,18 @@ class Simulation:
         return {k: v for k, v in vars(self).items() if k != "_compiled"}
 
     def _column(self, name: str) -> npt.NDArray[Any]:
-        """A column of the stored steps, by the name of its place in the kernel's data."""
+        """A column of the steps from t = 0 on and the one before, by its name in the kernel."""
         data = kernel("data")
         real = name in ("START", "LENGTH")
         column: npt.NDArray[Any] = self._history["real" if real else "whole"][
-            :, getattr(data, name)
+            self._first - 1 :, getattr(data, name)
         ]
         return column
 
     @property
     def steps(self) -> int:
         """Number of accepted steps."""
-        return int(self._history["real"].shape[0]) - 1
+        return int(self._history["real"].shape[0]) - self._first
 
     @functools.cached_property
     def times(self) -> FloatArray:
@@ -220,7 +223,8 @@ class Simulation:
         data = kernel("data")
         settings, history = self._compiled
         places = np.ascontiguousarray(places, dtype=np.int64)
-        rows = kernel("sample").evaluate(settings, history, self.steps + 1, places, times)
+        taken, before = history.real.shape[0], self._first - 1
+        rows = kernel("sample").evaluate(settings, history, taken, places + before, times)
         stuck = self._column("TORSION")[places] == data.STUCK
         held = self._column("AXIAL")[places] == data.HELD
         nonlinear = self.model == "nonlinear"
@@ -228,6 +232,21 @@ class Simulation:
         on_rock = values.pop("contact") > 0.0
         modes = {"contact": on_rock, "stuck": stuck & nonlinear, "held": held & nonlinear}
         return Motion(times=times, **values, **modes)
+
+    def past(self, time: float | None = None) -> Past:
+        """Return what the run has left behind at an instant, to start another one from.
+
+        Parameters
+        ----------
+        time : float, optional
+            By default the end of the run.
+
+        Raises
+        ------
+        InputError
+            If the instant is outside the run, or the rig was changed before it.
+        """
+        return past_of(self, time)
 
     @functools.cached_property
     def steady_load(self) -> tuple[float, float]:
@@ -246,8 +265,10 @@ class Simulation:
         contact = {0: "loss", 1: "return"}
         found = []
         start, on_rock = self._column("START"), self._column("CONTACT")
+        saturated = self._column("SATURATED")
         columns = {name: self._column(name.upper()) for name in ("contact", "torsion", "axial")}
         changed = np.zeros(self.steps + 1, dtype=bool)
+        changed[2:] = saturated[2:] != saturated[1:-1]
         for column in columns.values():
             changed[2:] |= column[2:] != column[1:-1]
         for j in np.flatnonzero(changed):
@@ -258,6 +279,11 @@ class Simulation:
                 meaningless = name == "axial" and not (on_rock[j] and on_rock[j - 1])
                 if now != before and not meaningless:
                     found.append(Event(time, names[now]))
+            before, now = int(saturated[j - 1]), int(saturated[j])
+            if now & ~before:
+                found.append(Event(time, "saturate"))
+            if before & ~now:
+                found.append(Event(time, "desaturate"))
         return tuple(found)
 
     def phases(self, name: str) -> tuple[tuple[float, float], ...]:
@@ -265,13 +291,14 @@ class Simulation:
 
         Parameters
         ----------
-        name : {"stuck", "held", "lost"}
-            Torsional stick, axial hold, loss of contact.
+        name : {"stuck", "held", "lost", "saturated"}
+            Torsional stick, axial hold, loss of contact, an input or actuator at its limit.
         """
         modes = {
             "stuck": self._column("TORSION") == kernel("data").STUCK,
             "held": self._column("AXIAL") == kernel("data").HELD,
             "lost": self._column("CONTACT") == 0,
+            "saturated": self._column("SATURATED") != 0,
         }
         if name not in modes:
             raise InputError("phase", name, f"one of {', '.join(modes)}")

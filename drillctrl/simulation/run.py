@@ -148,7 +148,7 @@ def simulate(
         rtol=rtol,
         atol=atol,
     )
-    standing = begin(point, settings, scenario, linear, room=min(FIRST_ROOM, max_steps + 2))
+    standing = begin(point, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1))
     march, data = kernel("march"), kernel("data")
     status = {
         data.DONE: "done",
@@ -159,11 +159,11 @@ def simulate(
     }
     started = time.perf_counter()
     while True:
-        outcome = march.march(*standing, duration, float(max_step))
+        outcome = march.march(*standing[:-1], duration, float(max_step))
         used = int(standing.ints[march.STEPS])
-        if outcome != data.MORE_ROOM or used > max_steps:
+        if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
             break
-        room = min(2 * standing.history.real.shape[0], max_steps + 2)
+        room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
         standing = standing._replace(history=resized(standing.history, room, used))
     elapsed = time.perf_counter() - started
     history = resized(standing.history, used, used)
@@ -182,4 +182,5 @@ def simulate(
         elapsed_seconds=elapsed,
         _settings=settings._asdict(),
         _history=history._asdict(),
+        _first=standing.first,
     )

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from drillctrl.errors import InputError, checked_number
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.plant import STATE_NAMES
+from drillctrl.simulation.past import Past
 
 FloatArray = npt.NDArray[np.float64]
 STARTS = ("steady", "rest")
@@ -61,9 +62,9 @@ class Scenario:
 
     Attributes
     ----------
-    start : {"steady", "rest"}
+    start : {"steady", "rest"} or Past
         Steady drilling until t = 0; or a bit at rest that just touches flat rock, unloaded,
-        whose top end sets off at t = 0.
+        whose top end sets off at t = 0; or what another run left behind (`Simulation.past`).
     initial : mapping
         Perturbation by state name (x, dx, theta, dtheta) that is added at t = 0.
     changes : tuple of Change
@@ -75,13 +76,13 @@ class Scenario:
         If a name is unknown, a value is not finite, or changes overlap.
     """
 
-    start: str = "steady"
+    start: str | Past = "steady"
     initial: Mapping[str, float] = field(default_factory=dict)
     changes: tuple[Change, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.start not in STARTS:
-            raise InputError("start", self.start, f"one of {', '.join(STARTS)}")
+        if not isinstance(self.start, Past) and self.start not in STARTS:
+            raise InputError("start", self.start, f"one of {', '.join(STARTS)}, or a Past")
         for name, value in self.initial.items():
             if name not in STATE_NAMES:
                 raise InputError("initial", name, f"one of {', '.join(STATE_NAMES)}")

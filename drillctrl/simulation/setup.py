@@ -18,6 +18,7 @@ from drillctrl.plant import (
 )
 from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.past import Past
 from drillctrl.simulation.scenario import Scenario
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,7 +27,11 @@ MAX_SAMPLES = 10_000_000
 
 
 class March(NamedTuple):
-    """Where the integrator stands, and what it has stored."""
+    """Where the integrator stands, and what it has stored.
+
+    All but the last are what the compiled march takes; ``first`` is the number of steps
+    that lie before t = 0.
+    """
 
     settings: Any
     history: Any
@@ -35,6 +40,7 @@ class March(NamedTuple):
     y: FloatArray
     chain: npt.NDArray[np.int64]
     following: npt.NDArray[np.int64]
+    first: int
 
 
 def settings_for(
@@ -101,7 +107,7 @@ def settings_for(
         lags=tuple(lags.tolist()),
         noise=noise,
         tolerance=(rtol, atol),
-        scale=tuple(_scales(point).tolist()),
+        scale=tuple(_scales(point, limit, rate).tolist()),
     )
 
 
@@ -121,14 +127,15 @@ def _noise(controller: Controller, duration: float) -> FloatArray:
     return draws
 
 
-def _scales(point: OperatingPoint) -> FloatArray:
+def _scales(point: OperatingPoint, limit: FloatArray, rate_limit: FloatArray) -> FloatArray:
     """Size of each event function at the point, in the order of the kinds of event."""
     assert point.lam is not None
     depth = max(2.0 * np.pi * point.delta0, 1e-3)
     torque = depth + point.beta + 1.0
     force = point.psi * depth + point.lam + 1.0
     rate = max(point.penetration_rate, 1e-3)
-    return np.array([point.omega0, torque, torque, rate, force, force, depth])
+    scales = [point.omega0, torque, torque, rate, force, force, depth, *limit, *rate_limit]
+    return np.where(np.isfinite(scales), scales, 1.0)
 
 
 def empty_history(room: int) -> Any:
@@ -154,49 +161,107 @@ def check_start(point: OperatingPoint, scenario: Scenario, linear: bool) -> None
     Raises
     ------
     InputError
-        If the bit would start turning backwards, or the linear model from rest.
+        If the bit would start turning backwards, the linear model from rest, or a run from
+        the past of another operating point or model.
     """
-    if linear and scenario.start == "rest":
-        raise InputError("start", "rest", "steady for the linear model")
+    start = scenario.start
+    low = -point.omega0
+    if isinstance(start, Past):
+        if start.point != point:
+            raise InputError("start", repr(start), f"a past of {point!r}, not of {start.point!r}")
+        if (start.model == "linear") != linear:
+            raise InputError("model", "linear" if linear else "nonlinear", "that of the past")
+        low -= float(start.state[3])
+    elif start == "rest":
+        if linear:
+            raise InputError("start", "rest", "steady for the linear model")
+        low = 0.0
     kick = scenario.perturbation()[3]
-    low = -point.omega0 if scenario.start == "steady" else 0.0
     if not linear and kick < low:
         raise InputError("initial dtheta", kick, f"at least {low:g}: the bit must not turn back")
 
 
 def begin(
-    point: OperatingPoint, settings: Any, scenario: Scenario, linear: bool, room: int = FIRST_ROOM
+    point: OperatingPoint,
+    controller: Controller | None,
+    settings: Any,
+    scenario: Scenario,
+    room: int = FIRST_ROOM,
 ) -> March:
     """Return a march that stands at t = 0.
 
     Before t = 0 there is step 0: steady drilling, or flat rock under a bit at rest (which
-    is any motion with constant Z; the delay it implies is that of steady drilling). The
-    start has passed `check_start`.
+    is any motion with constant Z; the delay it implies is that of steady drilling); and the
+    steps of a run that is gone on from. The start has passed `check_start`.
     """
-    data, march, switch = kernel("data"), kernel("march"), kernel("switch")
-    history = empty_history(room)
-    before = history.real[0]
-    before[[data.START, data.LENGTH]] = -1.0, 1.0
+    march, control = kernel("march"), kernel("control")
+    standing = (
+        _resume(scenario.start, settings, room)
+        if isinstance(scenario.start, Past)
+        else _set_off(point, settings, scenario.start, room)
+    )
+    _, history, ints, reals, y, chain, _, first = standing
     kick = scenario.perturbation()
-    y = np.zeros(6)
-    if scenario.start == "rest":
+    y[:4] += kick
+    if kick[1]:
+        ints[march.I_AXIAL] = kernel("data").DOWN
+    if kick[3]:
+        ints[march.I_TORSION] = kernel("data").FORWARD
+    if kick[0] or kick[2]:
+        ints[march.I_LEVEL] = 0
+    reals[march.STEP] = 1e-2 * point.delay
+    reals[march.NEXT_SAMPLE] = settings.control[kernel("data").T_ON]
+    if controller is not None and controller.activation == 0.0:
+        # What the drive gives at this instant is where its limits of rate begin.
+        reals[[march.HELD0, march.HELD1]] = y[4:]
+    control.take_sample(settings, history, first, ints, reals, 0.0)
+    march.enter(settings, history, first, ints, reals, chain, kernel("data").BEGIN, 0.0, y)
+    return standing
+
+
+def _blank(settings: Any, room: int) -> March:
+    """Return a march before anything."""
+    data, march = kernel("data"), kernel("march")
+    chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
+    following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
+    ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(5)
+    ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
+    return March(settings, empty_history(room), ints, reals, np.zeros(6), chain, following, 1)
+
+
+def _set_off(point: OperatingPoint, settings: Any, start: str, room: int) -> March:
+    """Return a march after steady drilling, or with a bit at rest."""
+    data = kernel("data")
+    standing = _blank(settings, room)
+    before, y = standing.history.real[0], standing.y
+    before[[data.START, data.LENGTH]] = -1.0, 1.0
+    if start == "rest":
         y[[0, 2]] = branch_functions()[-1](np.array(settings.p)).full().ravel()
         before[data.X : data.X + 2] = y[0] + point.penetration_rate, -point.penetration_rate
         before[data.THETA] = y[2]
         y[[1, 3]] = -point.penetration_rate, -point.omega0
-    y[:4] += kick
-    history.whole[0, [data.CONTACT, data.PASSES]] = 1
-    ints = np.zeros(march.LAG0 + 3, dtype=np.int64)
-    reals = np.zeros(5)
-    chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
-    following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
-    ints[march.STEPS] = ints[march.I_CONTACT] = ints[march.I_PASSES] = 1
-    ints[march.I_LEVEL] = 0 if kick[0] or kick[2] else 1
-    reals[march.STEP] = 1e-2 * point.delay
-    reals[march.NEXT_SAMPLE] = settings.control[data.T_ON]
-    standing = March(settings, history, ints, reals, y, chain, following)
-    kernel("control").take_sample(settings, history, 1, ints, reals, 0.0)
-    mode = march.mode_of(ints, reals, chain)
-    after = switch.next_mode(settings, history, 1, mode, data.BEGIN, 0.0, y)
-    march.enter(ints, after)
+    standing.history.whole[0, [data.CONTACT, data.PASSES]] = 1
+    return standing
+
+
+def _resume(past: Past, settings: Any, room: int) -> March:
+    """Return a march that goes on from what another has left behind."""
+    data, march, breaks = kernel("data"), kernel("march"), kernel("breaks")
+    steps = len(past.real)
+    standing = _blank(settings, steps + room)._replace(first=steps)
+    _, history, ints, _, y, chain, following, _ = standing
+    history.real[:steps], history.whole[:steps] = past.real, past.whole
+    y[:] = past.state
+    last = past.whole[-1]
+    ints[march.STEPS] = steps
+    ints[march.I_CONTACT] = last[data.CONTACT]
+    ints[march.I_TORSION], ints[march.I_AXIAL] = last[data.TORSION], last[data.AXIAL]
+    # Another controller takes over: its torque need not continue the one before.
+    ints[march.I_LEVEL] = 2
+    for i, lag in enumerate(settings.lags):
+        if lag > 0.0:
+            ints[march.LAG0 + i] = kernel("interpolate").step_at(history, steps, -lag)
+    if past.model == "nonlinear":
+        where = settings, history, steps, chain, following, 0.0, y[2]
+        ints[march.I_PASSES] = breaks.retrace(*where, 1e-13 * (1.0 + abs(y[2])))
     return standing

@@ -52,6 +52,35 @@ def test_limits_hold_and_are_reached():
     np.testing.assert_allclose(theta(Controller(*GAINS, limit=1e6)), ideal, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"limit": 0.3},
+        {"limit": 0.3, "delay": "current"},
+        {"limit": 0.3, "actuator_lag": 0.05},
+        {"rate_limit": 1.0, "actuator_lag": 0.05},
+    ],
+    ids=str,
+)
+def test_saturation_is_located_so_the_order_stays(limits):
+    def run(rtol):
+        controller = Controller(*GAINS, **limits)
+        return simulate(POINT, controller, duration=20.0, initial=KICK, rtol=rtol, atol=0.1 * rtol)
+
+    exact = run(1e-12).at(TIMES).dtheta
+    coarse, fine = run(1e-6), run(1e-10)
+    errors = [abs(r.at(TIMES).dtheta - exact).max() for r in (coarse, fine)]
+    order = np.log(errors[0] / errors[1]) / np.log(fine.steps / coarse.steps)
+    assert 4.5 < order < 6.5
+    met = [[e.time for e in r.events if e.name == "saturate"] for r in (coarse, fine)]
+    assert len(met[0]) >= 1
+    np.testing.assert_allclose(met[0], met[1], atol=1e-5)
+    for start, end in fine.phases("saturated"):
+        inside = fine.at(np.linspace(start, end, 20)[1:-1]).torque
+        if "actuator_lag" not in limits:
+            np.testing.assert_allclose(abs(inside), 0.3, rtol=1e-12)
+
+
 def test_rate_limit_sampled_and_of_the_actuator():
     sampled = Controller(*GAINS, period=0.05, rate_limit=1.0)
     held = simulate(POINT, sampled, duration=10.0, initial=KICK)

@@ -20,7 +20,7 @@ from .data import (
     T_ON,
 )
 from .interpolate import locate_angle, state_at, step_at
-from .model import command, measured, piece_at
+from .model import command, measured, piece_at, within
 
 PIECE, GAINS, ON, SAMPLE = 6, 7, 8, 9
 HELD0, HELD1, NEXT_SAMPLE = 2, 3, 4
@@ -97,7 +97,7 @@ def take_sample(settings, history, steps, ints, reals, t):
     now = measured(settings.drive, noisy(settings, k, state), t_now)
     then = measured(settings.drive, noisy(settings, earlier, then), t_now - lag)
     for i in range(2):
-        u = command(settings.gains, settings.limit[i], ints[GAINS], now, then, i)
+        u = within(command(settings.gains, ints[GAINS], now, then, i), settings.limit[i])
         before = reals[HELD0 + i]
         if settings.flags[ACTUATOR] == 0:
             step = settings.rate[i] * period

@@ -13,11 +13,12 @@ FORWARD, STUCK, REVERSE = 0, 1, 2
 # Axial motion while in contact: Z' > 0, held at Z' = 0 by the wear flat, Z' < 0.
 DOWN, HELD, UP = 0, 1, 2
 
-# Events. The first seven are zeros of functions that are positive in the present mode.
+# Events. All but the last two are zeros of functions that are positive in the present mode.
 TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2
 AXIAL_RATE, HELD_TO_UP, HELD_TO_DOWN, DEPTH = 3, 4, 5, 6
-KINDS = 7
-BARRIER, BEGIN = 7, 8
+# An input at its limit, or its actuator at its fastest: one kind for each input.
+AT_LIMIT, AT_RATE_LIMIT, KINDS = 7, 9, 11
+BARRIER, BEGIN = 11, 12
 
 # How the march stopped.
 DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE = 0, 1, 2, 3, 4, 5
@@ -35,13 +36,14 @@ T_ON, MEASURE_DELAY, FEEDBACK_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3, 4
 # Columns of `drive`: start; top-end offset, speed, acceleration for x and θ; strength and slope.
 DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
 # Entries of `probe`, beside an event function's ingredients.
+# P_WANTED: two commands before their limits; P_SLEW: two rates of actuators before theirs.
 P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_U0, P_U1 = range(9)
-PROBES = 9
+P_WANTED, P_SLEW, PROBES = 9, 11, 13
 
 
 # Columns of `History`.
 START, LENGTH, X, THETA, ACTUATORS, HELD_U, REALS = 0, 1, 2, 8, 14, 22, 24
-CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, WHOLES = range(8)
+CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, SATURATED, WHOLES = range(9)
 
 
 class Settings(NamedTuple):
@@ -71,7 +73,7 @@ class Settings(NamedTuple):
         Added to the k-th sample of the states.
     tolerance : tuple, (2,)
         rtol, atol.
-    scale : tuple, (7,)
+    scale : tuple, (11,)
         Size of each event function, to tell zero from rounding.
     """
 
@@ -98,10 +100,10 @@ class History(NamedTuple):
         START: time at which a step starts; LENGTH; X, THETA: coefficients of quintics in
         s = (t − start)/length; ACTUATORS: those of a cubic for each actuator; HELD_U: output
         of a sampled controller.
-    whole : int array, (cap, 7)
+    whole : int array, (cap, 9)
         CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
         t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade
-        pitches it lies back.
+        pitches it lies back; SATURATED: see `Mode`.
     """
 
     real: Any
@@ -109,11 +111,15 @@ class History(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """One smooth branch of the model, and where its delayed signals are found."""
+    """One smooth branch of the model, and where its delayed signals are found.
+
+    Bit i of ``saturated`` says that an event of kind AT_LIMIT + i has set in.
+    """
 
     contact: int
     torsion: int
     axial: int
+    saturated: int
     lag: int
     face: int
     passes: int

@@ -16,6 +16,7 @@ from .breaks import (
 from .control import next_clock, take_sample
 from .data import (
     ACTUATOR,
+    AT_LIMIT,
     BARRIER,
     COLLAPSE,
     CURRENT_DELAY,
@@ -43,11 +44,11 @@ from .interpolate import locate_time
 from .model import rate_of_change
 from .physics import rates
 from .step import STAGE_COLUMNS, STAGES, attempt, record
-from .switch import next_mode, snap
+from .switch import next_mode, next_saturation, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
- REJECTED, EVALUATIONS, LAG0) = range(14)  # fmt: skip
+ REJECTED, EVALUATIONS, I_SATURATED, LAG0) = range(15)  # fmt: skip
 TIME, STEP, HELD0, HELD1, NEXT_SAMPLE = range(5)
 REFINE = 6
 SHORTEST = 1e-14
@@ -61,6 +62,7 @@ def mode_of(ints, reals, chain):
         ints[I_CONTACT],
         ints[I_TORSION],
         ints[I_AXIAL],
+        ints[I_SATURATED],
         chain[0],
         chain[passes - 1],
         passes,
@@ -76,9 +78,22 @@ def mode_of(ints, reals, chain):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def enter(ints, branch):
-    """Enter a branch."""
-    ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
+def enter(settings, history, steps, ints, reals, chain, kind, t, y):
+    """Enter the mode that follows an event, a break or the start."""
+    mode = mode_of(ints, reals, chain)
+    if not AT_LIMIT <= kind < KINDS:
+        branch = next_mode(settings, history, steps, mode, kind, t, y)
+        ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
+        mode = mode_of(ints, reals, chain)
+    ints[I_SATURATED] = next_saturation(settings, history, steps, mode, kind, t, y)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def level_of(settings, kind):
+    """Level of the break that an event makes; see `LAST_LEVEL`."""
+    if kind < AT_LIMIT:
+        return 2
+    return 4 if settings.flags[ACTUATOR] == 1 else 3
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -243,12 +258,11 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
 
         # End at the first event.
         kind, where = -1, NONE
-        if not linear:
-            for candidate in range(KINDS):
-                if watched(candidate, mode):
-                    s = first_zero(settings, history, steps, mode, candidate, stages)
-                    if s < where:
-                        kind, where = candidate, s
+        for candidate in range(KINDS):
+            if watched(settings, candidate, mode):
+                s = first_zero(settings, history, steps, mode, candidate, stages)
+                if s < where:
+                    kind, where = candidate, s
         if kind >= 0:
             if where * h < SHORTEST * max(1.0, abs(t)):
                 # Negative from the start: no step, another mode.
@@ -256,8 +270,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 if ints[STALLS] > 20:
                     return COLLAPSE
                 snap(kind, y, p)
-                enter(ints, next_mode(settings, history, steps, mode, kind, t, y))
-                ints[I_LEVEL] = min(ints[I_LEVEL], 2)
+                enter(settings, history, steps, ints, reals, chain, kind, t, y)
+                ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
                 known = False
                 continue
             if where < 1.0:
@@ -294,7 +308,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             level = 2
         if kind >= 0:
             snap(kind, y, p)
-            level = 2
+            level = min(level, level_of(settings, kind))
         # The last stage is the first of the next step, unless something breaks there.
         known = level == NO_BREAK and reached < 0
         if known:
@@ -302,8 +316,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 k[0, i] = k[STAGES - 1, i]
             for i in range(STAGE_COLUMNS):
                 stages[0, i] = stages[STAGES - 1, i]
-        mode = mode_of(ints, reals, chain)
         if kind >= 0 or level <= 2:
-            after = next_mode(settings, history, steps, mode, kind if kind >= 0 else BARRIER, t, y)
-            enter(ints, after)
+            cause = kind if kind >= 0 else BARRIER
+            enter(settings, history, steps, ints, reals, chain, cause, t, y)
         ints[I_LEVEL] = level

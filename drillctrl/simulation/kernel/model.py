@@ -23,9 +23,11 @@ from .data import (
     P_FORWARD,
     P_PRESSED,
     P_REVERSE,
+    P_SLEW,
     P_U0,
     P_U1,
     P_UP,
+    P_WANTED,
     REVERSE,
     SAMPLED,
     START,
@@ -77,17 +79,23 @@ def measured(drive, state, t):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def command(rows, limit, gains, now, then, i):
-    """K1 Y + K2 Y_delayed for input i, within its limit (Eqs. 36, 38)."""
+def command(rows, gains, now, then, i):
+    """K1 Y + K2 Y_delayed for input i (Eqs. 36, 38)."""
     u = 0.0
     for k in range(4):
         u += rows[gains, 1 + 4 * i + k] * now[k] + rows[gains, 9 + 4 * i + k] * then[k]
-    return min(max(u, -limit), limit)
+    return u
 
 
 @numba.njit(cache=True, error_model="numpy")
-def inputs_at(settings, history, steps, mode, t, state, lagged):
-    """Command of the controller at t."""
+def within(value, limit):
+    """The value, or the limit it is beyond."""
+    return min(max(value, -limit), limit)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def wanted_at(settings, history, steps, mode, t, state, lagged):
+    """Command of the controller at t before its limits."""
     flags = settings.flags
     if flags[SAMPLED] == 1:
         return mode.held0, mode.held1
@@ -106,17 +114,30 @@ def inputs_at(settings, history, steps, mode, t, state, lagged):
     now = measured(settings.drive, now, t_now)
     then = measured(settings.drive, then, t_then)
     return (
-        command(settings.gains, settings.limit[0], mode.gains, now, then, 0),
-        command(settings.gains, settings.limit[1], mode.gains, now, then, 1),
+        command(settings.gains, mode.gains, now, then, 0),
+        command(settings.gains, mode.gains, now, then, 1),
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def actuate(settings, i, wanted, actual):
-    """Rate of change of actuator i: first-order lag within its rate limit."""
-    rate = (wanted - actual) / settings.control[LAG_TIME]
-    limit = settings.rate[i]
-    return min(max(rate, -limit), limit)
+def inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe):
+    """Inputs to the plant at t: commands, or actuators that follow them with a lag (Eq. 36).
+
+    Commands and rates of actuators are held within their limits here; the probe takes them
+    as they would be without, so that the limits can be met by an event.
+    """
+    wanted = (0.0, 0.0)
+    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
+        wanted = wanted_at(settings, history, steps, mode, t, state, lagged)
+    probe[P_WANTED], probe[P_WANTED + 1] = wanted
+    u = within(wanted[0], settings.limit[0]), within(wanted[1], settings.limit[1])
+    if settings.flags[ACTUATOR] == 0:
+        return u
+    for i in range(2):
+        slew = (u[i] - y[4 + i]) / settings.control[LAG_TIME]
+        probe[P_SLEW + i] = slew
+        out[4 + i] = within(slew, settings.rate[i])
+    return y[4], y[5]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -127,7 +148,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     ----------
     y, out : array, (6,)
         x, x', θ, θ' and the two actuator states; their rates of change.
-    probe : array, (9,)
+    probe : array, (13,)
         Takes depth, accelerations at the limits of what contact can bear, delay, inputs.
     """
     p = settings.p
@@ -147,14 +168,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
     d = depth(state, face, since, p)
     lagged = (then[0], then[1], then[2], then[3], delay)
-    wanted = (0.0, 0.0)
-    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
-        wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
-    u = wanted
-    if settings.flags[ACTUATOR] == 1:
-        u = (y[4], y[5])
-        out[4] = actuate(settings, 0, wanted[0], y[4])
-        out[5] = actuate(settings, 1, wanted[1], y[5])
+    u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
     top, strength = (0.0, 0.0), 1.0
     if settings.drive.shape[0] > 1:
         moved = top_at(settings.drive, mode.piece, t)
@@ -206,14 +220,7 @@ def linear_rate(settings, history, steps, mode, t, y, out, probe):
     then = state_at(history, j, s)
     state = (y[0], y[1], y[2], y[3])
     lagged = (then[0], then[1], then[2], then[3], settings.lags[0])
-    wanted = (0.0, 0.0)
-    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
-        wanted = inputs_at(settings, history, steps, mode, t, state, lagged)
-    u = wanted
-    if settings.flags[ACTUATOR] == 1:
-        u = (y[4], y[5])
-        out[4] = actuate(settings, 0, wanted[0], y[4])
-        out[5] = actuate(settings, 1, wanted[1], y[5])
+    u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
     rows = settings.linear
     d = rows[4, 8]  # 2πδ0
     for i in range(4):

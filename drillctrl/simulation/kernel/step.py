@@ -22,6 +22,7 @@ from .data import (
     P_DEPTH,
     PASSES,
     PROBES,
+    SATURATED,
     START,
     THETA,
     TORSION,
@@ -122,3 +123,4 @@ def record(settings, history, j, mode, t, h, y, k, new, increment, level):
         mode.face,
         mode.passes,
     )
+    history.whole[j, SATURATED] = mode.saturated

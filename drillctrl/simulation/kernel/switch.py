@@ -6,6 +6,7 @@ import numba
 import numpy as np
 
 from .data import (
+    AT_LIMIT,
     AXIAL_RATE,
     DEPTH,
     DOWN,
@@ -29,6 +30,7 @@ from .data import (
     UP,
     Mode,
 )
+from .events import headroom, watched
 from .model import rate_of_change
 from .physics import rates
 
@@ -40,6 +42,7 @@ def with_branch(mode, contact, torsion, axial):
         contact,
         torsion,
         axial,
+        mode.saturated,
         mode.lag,
         mode.face,
         mode.passes,
@@ -62,6 +65,20 @@ def snap(kind, y, p):
         y[1] = -zero[0]
     elif kind == TORSION_RATE:
         y[3] = -zero[1]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def next_saturation(settings, history, steps, mode, kind, t, y):
+    """Which limits hold the inputs after an event or a jump, as bits; see `Mode`."""
+    if AT_LIMIT <= kind < KINDS:
+        return mode.saturated ^ (1 << (kind - AT_LIMIT))
+    out, probe = np.empty(6), np.zeros(PROBES)
+    rate_of_change(settings, history, steps, mode, t, y, out, probe)
+    saturated = 0
+    for limit in range(AT_LIMIT, KINDS):
+        if watched(settings, limit, mode) and headroom(settings, limit, probe) < 0.0:
+            saturated |= 1 << (limit - AT_LIMIT)
+    return saturated
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -1,0 +1,93 @@
+"""What a motion has left behind at an instant: a start for another run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.errors import InputError, checked_number
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation.build import kernel
+
+if TYPE_CHECKING:
+    from drillctrl.simulation.result import Simulation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A motion up to an instant, which becomes the t = 0 of another run.
+
+    With a delay that depends on the motion a state is no start: what was cut before, and the
+    signals that a controller has yet to use, belong to it.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+        Where the rig drilled.
+    model : str
+        Of the run that it was taken from.
+    state : array, (6,)
+        x, x', θ, θ' and both inputs at the instant.
+    real, whole : array
+        Steps of the integrator up to the instant, as in its history; times end at 0.
+    """
+
+    point: OperatingPoint
+    model: str
+    state: FloatArray
+    real: FloatArray
+    whole: npt.NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        begun = float(self.real[1, 0]) if len(self.real) > 1 else 0.0
+        return f"<Past: {-begun:g} units of time, {len(self.real) - 1} steps>"
+
+
+def past_of(run: Simulation, time: float | None = None) -> Past:
+    """Return what a run has left behind.
+
+    Parameters
+    ----------
+    run : Simulation
+        Without changes of the drive or the rock before that instant.
+    time : float, optional
+        The instant; by default the end of the run.
+
+    Raises
+    ------
+    InputError
+        If the instant lies outside the run, or something was changed before it.
+    """
+    end = float(run.times[-1])
+    when = end if time is None else checked_number("time", time, 0.0, end)
+    changes = run.scenario.changes
+    if changes and changes[0].time < when:
+        raise InputError("time", when, f"at most {changes[0].time:g}, where the rig is changed")
+    data = kernel("data")
+    history: dict[str, Any] = dict(run._history)
+    start = history["real"][:, data.START]
+    last = int(np.searchsorted(start, when, side="left"))
+    first = run._first
+    last = max(last, first)
+    real, whole = history["real"][:last].copy(), history["whole"][:last].copy()
+    if last > first:
+        _cut(real[-1], when, data)
+    real[:, data.START] -= when
+    motion = run.at([when])
+    columns = (motion.x, motion.dx, motion.theta, motion.dtheta, motion.axial, motion.torque)
+    state = np.array([float(column[0]) for column in columns])
+    return Past(run.point, run.model, state, real, whole)
+
+
+def _cut(row: FloatArray, time: float, data: Any) -> None:
+    """Shorten a step so that it ends at an instant within it; its motion stays the same."""
+    share = (time - row[data.START]) / row[data.LENGTH]
+    row[data.LENGTH] *= share
+    actuators = data.ACTUATORS
+    for begin, count in ((data.X, 6), (data.THETA, 6), (actuators, 4), (actuators + 4, 4)):
+        row[begin : begin + count] *= share ** np.arange(count)

@@ -1,0 +1,78 @@
+"""A run that goes on from what another has left behind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drillctrl.errors import InputError
+from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation import Change, Controller, Scenario, simulate
+
+POINT = OperatingPoint(10.0, 2.5, 14.0)
+GAINS = ("case1", [-3.82], [3.61])
+KICK = {"dx": 1.0, "dtheta": 1.0}
+# Slips, sticks, off the rock, in the first turn.
+INSTANTS = (0.4, 13.1, 29.7)
+
+
+def apart(whole, rest, start):
+    times = np.linspace(start, whole.duration, 1500)
+    a, b = whole.at(times), rest.at(np.minimum(times - start, rest.duration))
+    return max(abs(getattr(a, n) - getattr(b, n)).max() for n in ("x", "dtheta", "delay", "torque"))
+
+
+@pytest.mark.parametrize("start", INSTANTS)
+@pytest.mark.parametrize("cutting", ["multiple", "single"])
+def test_the_rest_of_a_stick_slip_motion_is_the_same(start, cutting):
+    options = {"cutting": cutting, "rtol": 1e-10}
+    whole = simulate(POINT, duration=45.0, initial=KICK, **options)
+    going_on = Scenario(start=whole.past(start))
+    rest = simulate(POINT, duration=45.0 - start, scenario=going_on, **options)
+    assert apart(whole, rest, start) < 1e-8
+    assert [e.name for e in rest.events] == [e.name for e in whole.events if e.time > start]
+
+
+@pytest.mark.parametrize("extra", [{}, {"actuator_lag": 0.1, "rate_limit": 2.0}], ids=str)
+def test_delayed_signals_and_actuators_belong_to_the_past(extra):
+    controller = Controller(*GAINS, measurement_delay=0.3, **extra)
+    whole = simulate(POINT, controller, duration=30.0, initial=KICK, rtol=1e-10)
+    rest = simulate(
+        POINT, controller, duration=20.0, scenario=Scenario(start=whole.past(10.0)), rtol=1e-10
+    )
+    assert apart(whole, rest, 10.0) < 1e-8
+
+
+def test_switching_on_later_is_a_past_under_a_controller():
+    late = Controller(*GAINS, activation=60.0)
+    whole = simulate(POINT, late, duration=90.0, initial=KICK, rtol=1e-10)
+    open_loop = simulate(POINT, duration=60.0, initial=KICK, rtol=1e-10)
+    start = Scenario(start=open_loop.past())
+    rest = simulate(POINT, Controller(*GAINS), duration=30.0, scenario=start, rtol=1e-10)
+    assert apart(whole, rest, 60.0) < 1e-7
+
+
+def test_a_past_of_a_past():
+    first = simulate(POINT, duration=20.0, initial=KICK, rtol=1e-10)
+    second = simulate(POINT, duration=10.0, scenario=Scenario(start=first.past(9.0)), rtol=1e-10)
+    third = simulate(POINT, duration=8.0, scenario=Scenario(start=second.past(3.0)), rtol=1e-10)
+    assert apart(first, third, 12.0) < 1e-8
+
+
+def test_a_past_that_does_not_fit_is_refused():
+    run = simulate(POINT, duration=10.0, initial=KICK)
+    other = OperatingPoint(11.0, 2.5, 14.0)
+    with pytest.raises(InputError, match="start"):
+        simulate(other, duration=1.0, scenario=Scenario(start=run.past()))
+    with pytest.raises(InputError, match="model"):
+        simulate(POINT, duration=1.0, scenario=Scenario(start=run.past()), model="linear")
+    with pytest.raises(InputError, match="time"):
+        run.past(11.0)
+    speed = float(run.at([5.0]).dtheta[0]) + POINT.omega0
+    kicked = Scenario(start=run.past(5.0), initial={"dtheta": -speed - 0.1})
+    with pytest.raises(InputError, match="turn back"):
+        simulate(POINT, duration=1.0, scenario=kicked)
+    changed = Scenario(changes=(Change(2.0, omega0=11.0),))
+    run = simulate(POINT, duration=10.0, scenario=changed)
+    with pytest.raises(InputError, match="changed"):
+        run.past(3.0)
