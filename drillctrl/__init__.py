@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     )
     from drillctrl.simulation import Change, Controller, Past, Scenario, Simulation, simulate
     from drillctrl.simulation.energy import band_energy
+    from drillctrl.simulation.floquet import floquet
     from drillctrl.simulation.orbits import limit_cycle, separation
     from drillctrl.spectrum.batch import spectral_abscissas
     from drillctrl.spectrum.comparison import compare_spectra, intervals_for
@@ -117,6 +118,7 @@ _HOME = {
     "dimensionless_plant": "plant",
     "dominant_roots": "spectrum.roots",
     "feed": "axial_feedback",
+    "floquet": "simulation.floquet",
     "frequency_response": "transfer",
     "from_control": "interop.plants",
     "gain_surface": "charts.discretised",
@@ -226,6 +228,7 @@ __all__ = [
     "dimensionless_plant",
     "dominant_roots",
     "feed",
+    "floquet",
     "frequency_response",
     "from_control",
     "gain_surface",

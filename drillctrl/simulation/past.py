@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import Polynomial
 
 from drillctrl.errors import InputError, checked_number
 from drillctrl.operating_point import OperatingPoint
@@ -76,7 +77,8 @@ def past_of(run: Simulation, time: float | None = None) -> Past:
     last = max(last, first)
     real, whole = history["real"][:last].copy(), history["whole"][:last].copy()
     if last > first:
-        _cut(real[-1], when, data)
+        begun, length = real[-1][[data.START, data.LENGTH]]
+        restrict(real[-1], 0.0, (when - begun) / length)
     real[:, data.START] -= when
     motion = run.at([when])
     columns = (motion.x, motion.dx, motion.theta, motion.dtheta, motion.axial, motion.torque)
@@ -84,10 +86,28 @@ def past_of(run: Simulation, time: float | None = None) -> Past:
     return Past(run.point, run.model, state, real, whole)
 
 
-def _cut(row: FloatArray, time: float, data: Any) -> None:
-    """Shorten a step so that it ends at an instant within it; its motion stays the same."""
-    share = (time - row[data.START]) / row[data.LENGTH]
+def restrict(row: FloatArray, low: float, high: float) -> None:
+    """Keep the part of a step between two places on it, in place; its motion stays the same.
+
+    Parameters
+    ----------
+    row : array, (REALS,)
+        A step of the history.
+    low, high : float
+        In [0, 1], from its start to its end.
+    """
+    data = kernel("data")
+    share = high - low
+    row[data.START] += low * row[data.LENGTH]
     row[data.LENGTH] *= share
     actuators = data.ACTUATORS
     for begin, count in ((data.X, 6), (data.THETA, 6), (actuators, 4), (actuators + 4, 4)):
-        row[begin : begin + count] *= share ** np.arange(count)
+        part = Polynomial(row[begin : begin + count])
+        row[begin : begin + count] = padded(part(Polynomial([low, share])), count)
+
+
+def padded(polynomial: Polynomial, count: int) -> FloatArray:
+    """Return that many coefficients of a polynomial."""
+    coefficients = np.zeros(count)
+    coefficients[: polynomial.coef.size] = polynomial.coef
+    return coefficients
