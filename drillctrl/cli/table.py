@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +10,12 @@ import click
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.cli.parallel import open_executor, open_progress
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.tables.grid import Axis, Grid
-    from drillctrl.tables.table import GainTable, Progress
+    from drillctrl.tables.table import GainTable
     from drillctrl.units import Dimension
 
 CONTROLLERS = (".c", ".st")
@@ -108,7 +105,7 @@ def table_command(
     if requirements:
         raise InputError("--min-decay, --min-radius, --max-input-gain", "given", "left out here")
     nodes = _read_grid({k: v for k, v in grid.items() if v is not None})
-    from drillctrl.tables.checkpoint import Checkpoint
+    from drillctrl.checkpoint import Checkpoint
     from drillctrl.tables.files import check_table_path, save_table
     from drillctrl.tables.table import table
 
@@ -117,7 +114,7 @@ def table_command(
         check_table_path(out)
     _check_controller(out, period, limit, controller)
     checkpoint = None if out is None else Checkpoint(f"{out}.checkpoint")
-    with _executor(workers, scheduler) as executor, _progress() as progress:
+    with open_executor(workers, scheduler) as executor, open_progress() as progress:
         result = table(
             nodes,
             structure,
@@ -165,63 +162,6 @@ def _write_controller(result: GainTable, out: str, period: float, limit: float) 
         from drillctrl.tables.export_c import export_c
 
         export_c(result, path.parent, path.stem, period=period, limit=limit)
-
-
-@contextlib.contextmanager
-def _executor(workers: int, scheduler: str | None) -> Iterator[Executor | None]:
-    """Yield what designs nodes side by side: a cluster, processes, or nothing."""
-    if scheduler is not None:
-        with _cluster(scheduler) as executor:
-            yield executor
-    elif workers == 1:
-        yield None
-    else:
-        import multiprocessing
-
-        # A forked child would inherit the threads of the linear algebra.
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-            yield pool
-
-
-@contextlib.contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
-    try:
-        import distributed
-    except ImportError:
-        raise InputError(
-            "--scheduler", address, "used with Dask: pip install 'drillctrl[cluster]'"
-        ) from None
-    try:
-        make: Any = distributed.Client
-        client = make(address, timeout="10s", set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError("--scheduler", address, f"a scheduler that answers ({error})") from None
-    with client, client.get_executor(pure=False) as executor:
-        yield executor
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Progress | None]:
-    """Yield what draws progress on a terminal; nothing is drawn into a file."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from tqdm import tqdm
-
-    bars: list[tqdm[Any]] = []
-
-    def show(stage: str, done: int, total: int) -> None:
-        if done == 1:
-            bars.append(tqdm(total=total, desc=stage, unit="node", file=sys.stderr, leave=False))
-        bars[-1].update()
-        if done == total:
-            bars[-1].close()
-
-    try:
-        yield show
-    finally:
-        for bar in bars:
-            bar.close()
 
 
 def _read_grid(given: dict[str, Any]) -> Grid:

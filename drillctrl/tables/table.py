@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
+from drillctrl.checkpoint import Checkpoint
 from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.feedback import FeedbackStructure, preset_structure
 from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.tables.checkpoint import Checkpoint
+from drillctrl.spreading import Progress, spread_out
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import (
@@ -28,6 +29,7 @@ from drillctrl.tables.interpolation import (
     place,
 )
 from drillctrl.tables.node import NodeDesign, NodeTask, check_node
+from drillctrl.tables.remembering import find_design, keep_design
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
 if TYPE_CHECKING:
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
 
 FALLBACKS = ("off", "best")
 Result = TypeVar("Result")
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +276,7 @@ def table(
     def run(
         stage: str, work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
     ) -> Iterable[Result]:
-        for done, result in enumerate(_spread_out(executor, work, tasks), 1):
+        for done, result in enumerate(spread_out(executor, work, tasks), 1):
             if progress is not None:
                 progress(stage, done, len(tasks))
             yield result
@@ -285,25 +286,28 @@ def table(
     ) -> Iterable[NodeDesign]:
         missing = {}
         for task in tasks:
-            known = checkpoint.find(task) if checkpoint is not None else None
+            known = None if checkpoint is None else find_design(checkpoint, task)
             if known is not None:
                 yield known
             else:
                 missing[task.index] = task
         for design in run("design", work, list(missing.values())):
             if checkpoint is not None:
-                checkpoint.keep(missing[design.index], design)
+                keep_design(checkpoint, missing[design.index], design)
             yield design
 
     designs = design_grid(grid, chosen, seed, remembered, objective)
     best = np.array([design.spectral_abscissa for design in designs])
     gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
-    gains = smooth_gains(grid, chosen, gains, best, share)
+    with threadpool_limits(1, user_api="blas"):
+        gains = smooth_gains(grid, chosen, gains, best, share)
     if fallback == "off":
         gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
     tasks = [NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)]
     checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
     stable = np.array([check.stable for check in checks])
+    with threadpool_limits(1, user_api="blas"):
+        cells = check_cells(grid, chosen, gains, stable)
     return GainTable(
         grid,
         chosen,
@@ -315,24 +319,6 @@ def table(
         share,
         fallback,
         seed,
-        check_cells(grid, chosen, gains, stable),
+        cells,
         repr(objective),
     )
-
-
-def _spread_out(
-    executor: Executor | None, work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
-) -> Iterable[Result]:
-    """Yield the results of all tasks, in any order; chunks cost less than single tasks."""
-    if executor is None:
-        yield from map(work, tasks)
-        return
-    size = max(1, min(16, math.ceil(len(tasks) / 16)))
-    chunks = [tasks[i : i + size] for i in range(0, len(tasks), size)]
-    futures = [executor.submit(_work_through, work, chunk) for chunk in chunks]
-    for future in as_completed(futures):
-        yield from future.result()
-
-
-def _work_through(work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]) -> list[Result]:
-    return [work(task) for task in tasks]

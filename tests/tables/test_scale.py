@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drillctrl import InputError, cli, dimensionless_grid, linear_axis, table
-from drillctrl.tables.checkpoint import Checkpoint
+from drillctrl.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
 SLOW = ["table", "--omega0", "6:22:6", "--delta0", "1:11:5", "--structure", "case2", "--out"]

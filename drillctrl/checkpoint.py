@@ -1,0 +1,87 @@
+"""Results kept in a file as they come, so that a run that was killed goes on where it was."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from drillctrl.errors import InputError
+
+
+class Checkpoint:
+    """An append-only file of finished results.
+
+    Each line names its task by a key, a hash of everything that the result depends on, so
+    lines of another task are never taken for this one's. A line that was cut short is dropped.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; made if it does not exist.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or written.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        self._known: dict[str, dict[str, Any]] = {}
+        try:
+            self._file = self._path.open("a+b")
+            self._file.seek(0)
+            kept = 0
+            for line in self._file:
+                entry = _read_line(line)
+                if entry is None:
+                    break
+                self._known[entry["task"]] = entry["result"]
+                kept += len(line)
+            self._file.truncate(kept)
+        except OSError as error:
+            raise self._refused(error) from None
+
+    def _refused(self, error: OSError) -> InputError:
+        return InputError(
+            "checkpoint", str(self._path), f"a file that can be written ({error.strerror})"
+        )
+
+    def find(self, key: str) -> dict[str, Any] | None:
+        """Return the result of a task if it is known."""
+        return self._known.get(key)
+
+    def keep(self, key: str, result: dict[str, Any]) -> None:
+        """Append a result of JSON types.
+
+        Raises
+        ------
+        InputError
+            If the disk is full or the file is gone.
+        """
+        try:
+            line = json.dumps({"task": key, "result": result})
+            self._file.write(line.encode("ascii") + b"\n")
+            self._file.flush()
+        except OSError as error:
+            raise self._refused(error) from None
+
+    def remove(self) -> None:
+        """Close and delete the file: what it was for is done."""
+        self._file.close()
+        self._path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Close the file and leave it for the next run."""
+        self._file.close()
+
+
+def _read_line(line: bytes) -> dict[str, Any] | None:
+    """Return an entry, or None where the line is not whole."""
+    try:
+        entry = json.loads(line)
+        whole = isinstance(entry["task"], str) and isinstance(entry["result"], dict)
+    except (ValueError, KeyError, TypeError):
+        return None
+    return entry if whole and line.endswith(b"\n") else None
