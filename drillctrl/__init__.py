@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from drillctrl.analysis import LoopAnalysis, analyze_loop
     from drillctrl.axial_feedback import feed
+    from drillctrl.campaigns.campaign import Campaign, campaign
     from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.charts.volume import StabilityVolume, stability_volume
+    from drillctrl.checkpoint import Checkpoint
     from drillctrl.comparison.comparing import Comparison, compare
     from drillctrl.delay_system import DelaySystem, plant_system
     from drillctrl.design_result import Design
@@ -70,7 +72,9 @@ if TYPE_CHECKING:
 _HOME = {
     "Agreement": "reproduction.agreement",
     "Axis": "tables.grid",
+    "Campaign": "campaigns.campaign",
     "Change": "simulation",
+    "Checkpoint": "checkpoint",
     "Comparison": "comparison.comparing",
     "Controller": "simulation",
     "DelaySystem": "delay_system",
@@ -104,6 +108,7 @@ _HOME = {
     "analyze": "designing",
     "analyze_loop": "analysis",
     "band_energy": "simulation.energy",
+    "campaign": "campaigns.campaign",
     "characteristic_roots": "spectrum.roots",
     "chart": "charts.stability_chart",
     "close_loop": "feedback",
@@ -180,7 +185,9 @@ def __dir__() -> list[str]:
 __all__ = [
     "Agreement",
     "Axis",
+    "Campaign",
     "Change",
+    "Checkpoint",
     "Comparison",
     "Controller",
     "DelaySystem",
@@ -214,6 +221,7 @@ __all__ = [
     "analyze",
     "analyze_loop",
     "band_energy",
+    "campaign",
     "characteristic_roots",
     "chart",
     "close_loop",

@@ -43,6 +43,12 @@ class Checkpoint:
         except OSError as error:
             raise self._refused(error) from None
 
+    def __enter__(self) -> Checkpoint:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _refused(self, error: OSError) -> InputError:
         return InputError(
             "checkpoint", str(self._path), f"a file that can be written ({error.strerror})"

@@ -14,7 +14,7 @@ from drillctrl.tables.table import GainTable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LABELS = {
+AXIS_LABELS = {
     "omega0": "rotary speed ω0",
     "delta0": "depth of cut δ0",
     "psi": "cutting coefficient ψ",
@@ -76,14 +76,12 @@ def plot_table(table: GainTable) -> Figure:
                         Rectangle((x[i], y[j]), *size, fill=False, hatch=hatch, linewidth=0.0)
                     )
         ax.set_title(name)
-        ax.set_xlabel(_LABELS[grid.axes[down].name])
-        ax.set_ylabel(_LABELS[grid.axes[up].name])
+        ax.set_xlabel(AXIS_LABELS[grid.axes[down].name])
+        ax.set_ylabel(AXIS_LABELS[grid.axes[up].name])
     for ax in axes[len(fields) :]:
         ax.set_axis_off()
     third = grid.axes[across]
     note = "× not stable, //// not vouched for, · constant gains"
-    figure.suptitle(
-        f"{table.structure.name} at {_LABELS[third.name]} = {third.values[middle]:.4g};  {note}",
-        fontsize="medium",
-    )
+    where = f"{AXIS_LABELS[third.name]} = {third.values[middle]:.4g}"
+    figure.suptitle(f"{table.structure.name} at {where};  {note}", fontsize="medium")
     return figure
