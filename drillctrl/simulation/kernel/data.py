@@ -36,9 +36,9 @@ T_ON, MEASURE_DELAY, FEEDBACK_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3, 4
 # Columns of `drive`: start; top-end offset, speed, acceleration for x and θ; strength and slope.
 DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
 # Entries of `probe`, beside an event function's ingredients.
-# P_WANTED: two commands before their limits; P_SLEW: two rates of actuators before theirs.
+# P_ROOM: what is left until each limit of AT_LIMIT, AT_RATE_LIMIT is met; negative beyond.
 P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_U0, P_U1 = range(9)
-P_WANTED, P_SLEW, PROBES = 9, 11, 13
+P_ROOM, PROBES = 9, 13
 
 
 # Columns of `History`.

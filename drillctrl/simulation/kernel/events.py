@@ -13,20 +13,17 @@ from .data import (
     AXIAL_RATE,
     DEPTH,
     DOWN,
-    FEEDBACK,
     FORWARD,
     HELD,
     HELD_TO_DOWN,
     HELD_TO_UP,
     LENGTH,
-    LINEAR,
     P_DEPTH,
     P_DOWN,
     P_FORWARD,
     P_REVERSE,
-    P_SLEW,
+    P_ROOM,
     P_UP,
-    P_WANTED,
     PROBES,
     RELEASE_FORWARD,
     RELEASE_REVERSE,
@@ -48,13 +45,11 @@ def watched(settings, kind, mode):
     """Whether an event can end the present mode."""
     flags = settings.flags
     if kind >= AT_LIMIT:
-        if flags[FEEDBACK] == 0 or mode.on == 0:
+        if mode.on == 0:
             return False
         if kind >= AT_RATE_LIMIT:
             return flags[ACTUATOR] == 1 and np.isfinite(settings.rate[kind - AT_RATE_LIMIT])
         return flags[SAMPLED] == 0 and np.isfinite(settings.limit[kind - AT_LIMIT])
-    if flags[LINEAR] == 1:
-        return False
     if kind == TORSION_RATE:
         return mode.torsion != STUCK
     if kind in (RELEASE_FORWARD, RELEASE_REVERSE):
@@ -67,21 +62,10 @@ def watched(settings, kind, mode):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def headroom(settings, kind, probe):
-    """What is left until an input or its actuator's rate is at its limit; negative beyond."""
-    if kind >= AT_RATE_LIMIT:
-        i = kind - AT_RATE_LIMIT
-        return settings.rate[i] - abs(probe[P_SLEW + i])
-    i = kind - AT_LIMIT
-    return settings.limit[i] - abs(probe[P_WANTED + i])
-
-
-@numba.njit(cache=True, error_model="numpy")
-def value_of(settings, kind, mode, probe, dx, dtheta):
+def value_of(kind, mode, probe, dx, dtheta, p):
     """Event function: positive in the present mode, zero at its end."""
-    p = settings.p
     if kind >= AT_LIMIT:
-        left = headroom(settings, kind, probe)
+        left = probe[P_ROOM + kind - AT_LIMIT]
         return left if (mode.saturated >> (kind - AT_LIMIT)) & 1 == 0 else -left
     if kind == RELEASE_FORWARD:
         return -probe[P_FORWARD]
@@ -112,16 +96,15 @@ def value_on_step(settings, history, steps, mode, kind, s):
             y[4 + i] = cubic(history.real, ACTUATORS + 4 * i, steps, s)
         t = history.real[steps, START] + s * history.real[steps, LENGTH]
         rate_of_change(settings, history, steps, mode, t, y, np.empty(6), probe)
-    return value_of(settings, kind, mode, probe, state[1], state[3])
+    return value_of(kind, mode, probe, state[1], state[3], settings.p)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cannot_vanish(settings, kind, mode, stages, tolerance):
+def cannot_vanish(kind, mode, stages, p, tolerance):
     """Whether the stages of a step show an event function far from zero throughout."""
     low, high = np.inf, -np.inf
     for i in range(stages.shape[0]):
-        stage = stages[i]
-        value = value_of(settings, kind, mode, stage, stage[PROBES], stage[PROBES + 1])
+        value = value_of(kind, mode, stages[i], stages[i, PROBES], stages[i, PROBES + 1], p)
         low, high = min(low, value), max(high, value)
     return low > tolerance and low > 0.5 * (high - low)
 
@@ -161,7 +144,7 @@ def first_zero(settings, history, steps, mode, kind, stages):
         s in [0, 1]; 0 if the function is negative from the start, 2 if it never is.
     """
     tolerance = 1e-12 * settings.scale[kind]
-    if cannot_vanish(settings, kind, mode, stages, tolerance):
+    if cannot_vanish(kind, mode, stages, settings.p, tolerance):
         return NONE
     values = np.empty(SAMPLES + 1)
     for i in range(SAMPLES + 1):

@@ -21,6 +21,7 @@ from .data import (
     COLLAPSE,
     CURRENT_DELAY,
     DONE,
+    FEEDBACK,
     KINDS,
     LENGTH,
     LEVEL,
@@ -172,6 +173,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
     """
     p = settings.p
     linear = settings.flags[LINEAR] == 1
+    first_kind = AT_LIMIT if linear else 0
+    last_kind = KINDS if settings.flags[FEEDBACK] == 1 else AT_LIMIT
     k, stages = np.zeros((STAGES, 6)), np.zeros((STAGES, STAGE_COLUMNS))
     new, increment, probe = np.zeros(6), np.zeros(6), np.zeros(PROBES)
     zero_rates = rates((0.0, 0.0, 0.0, 0.0), p)
@@ -258,7 +261,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
 
         # End at the first event.
         kind, where = -1, NONE
-        for candidate in range(KINDS):
+        for candidate in range(first_kind, last_kind):
             if watched(settings, candidate, mode):
                 s = first_zero(settings, history, steps, mode, candidate, stages)
                 if s < where:

@@ -23,11 +23,10 @@ from .data import (
     P_FORWARD,
     P_PRESSED,
     P_REVERSE,
-    P_SLEW,
+    P_ROOM,
     P_U0,
     P_U1,
     P_UP,
-    P_WANTED,
     REVERSE,
     SAMPLED,
     START,
@@ -123,19 +122,20 @@ def wanted_at(settings, history, steps, mode, t, state, lagged):
 def inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe):
     """Inputs to the plant at t: commands, or actuators that follow them with a lag (Eq. 36).
 
-    Commands and rates of actuators are held within their limits here; the probe takes them
-    as they would be without, so that the limits can be met by an event.
+    Commands and rates of actuators are held within their limits here; the probe takes what
+    is left of these, so that an event can meet them.
     """
     wanted = (0.0, 0.0)
-    if settings.flags[FEEDBACK] == 1 and mode.on == 1:
+    if mode.on == 1:
         wanted = wanted_at(settings, history, steps, mode, t, state, lagged)
-    probe[P_WANTED], probe[P_WANTED + 1] = wanted
-    u = within(wanted[0], settings.limit[0]), within(wanted[1], settings.limit[1])
+    limit = settings.limit
+    probe[P_ROOM], probe[P_ROOM + 1] = limit[0] - abs(wanted[0]), limit[1] - abs(wanted[1])
+    u = within(wanted[0], limit[0]), within(wanted[1], limit[1])
     if settings.flags[ACTUATOR] == 0:
         return u
     for i in range(2):
         slew = (u[i] - y[4 + i]) / settings.control[LAG_TIME]
-        probe[P_SLEW + i] = slew
+        probe[P_ROOM + 2 + i] = settings.rate[i] - abs(slew)
         out[4 + i] = within(slew, settings.rate[i])
     return y[4], y[5]
 
@@ -168,7 +168,9 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
     d = depth(state, face, since, p)
     lagged = (then[0], then[1], then[2], then[3], delay)
-    u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
+    u = (0.0, 0.0)
+    if settings.flags[FEEDBACK] == 1:
+        u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
     top, strength = (0.0, 0.0), 1.0
     if settings.drive.shape[0] > 1:
         moved = top_at(settings.drive, mode.piece, t)
@@ -220,7 +222,9 @@ def linear_rate(settings, history, steps, mode, t, y, out, probe):
     then = state_at(history, j, s)
     state = (y[0], y[1], y[2], y[3])
     lagged = (then[0], then[1], then[2], then[3], settings.lags[0])
-    u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
+    u = (0.0, 0.0)
+    if settings.flags[FEEDBACK] == 1:
+        u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
     rows = settings.linear
     d = rows[4, 8]  # 2πδ0
     for i in range(4):

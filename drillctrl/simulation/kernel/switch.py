@@ -10,6 +10,7 @@ from .data import (
     AXIAL_RATE,
     DEPTH,
     DOWN,
+    FEEDBACK,
     FORWARD,
     HELD,
     HELD_TO_DOWN,
@@ -20,6 +21,7 @@ from .data import (
     P_DOWN,
     P_FORWARD,
     P_REVERSE,
+    P_ROOM,
     P_UP,
     PROBES,
     RELEASE_FORWARD,
@@ -30,7 +32,7 @@ from .data import (
     UP,
     Mode,
 )
-from .events import headroom, watched
+from .events import watched
 from .model import rate_of_change
 from .physics import rates
 
@@ -72,11 +74,13 @@ def next_saturation(settings, history, steps, mode, kind, t, y):
     """Which limits hold the inputs after an event or a jump, as bits; see `Mode`."""
     if AT_LIMIT <= kind < KINDS:
         return mode.saturated ^ (1 << (kind - AT_LIMIT))
+    if settings.flags[FEEDBACK] == 0:
+        return 0
     out, probe = np.empty(6), np.zeros(PROBES)
     rate_of_change(settings, history, steps, mode, t, y, out, probe)
     saturated = 0
     for limit in range(AT_LIMIT, KINDS):
-        if watched(settings, limit, mode) and headroom(settings, limit, probe) < 0.0:
+        if watched(settings, limit, mode) and probe[P_ROOM + limit - AT_LIMIT] < 0.0:
             saturated |= 1 << (limit - AT_LIMIT)
     return saturated
 
