@@ -12,8 +12,8 @@ from drillctrl.simulation import Change, Controller, Scenario, simulate
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 GAINS = ("case1", [-3.82], [3.61])
 KICK = {"dx": 1.0, "dtheta": 1.0}
-# Slips, sticks, off the rock, in the first turn.
-INSTANTS = (0.4, 13.1, 29.7)
+STOPPED = {"dtheta": -9.0}
+BOUNCING = OperatingPoint(4.0, 4.0, 30.0)
 
 
 def apart(whole, rest, start):
@@ -22,15 +22,37 @@ def apart(whole, rest, start):
     return max(abs(getattr(a, n) - getattr(b, n)).max() for n in ("x", "dtheta", "delay", "torque"))
 
 
-@pytest.mark.parametrize("start", INSTANTS)
+def held_at(motion):
+    return bool(motion.stuck[0]), bool(motion.held[0]), bool(motion.contact[0])
+
+
+@pytest.mark.parametrize(
+    ("point", "start", "state"),
+    [
+        (POINT, 0.3, (True, False, True)),
+        (POINT, 13.1, (False, False, True)),
+        (BOUNCING, 2.3, (False, False, False)),
+        (BOUNCING, 2.7, (True, False, True)),
+        (BOUNCING, 3.0, (False, False, False)),
+    ],
+    ids=str,
+)
 @pytest.mark.parametrize("cutting", ["multiple", "single"])
-def test_the_rest_of_a_stick_slip_motion_is_the_same(start, cutting):
-    options = {"cutting": cutting, "rtol": 1e-10}
-    whole = simulate(POINT, duration=45.0, initial=KICK, **options)
+def test_the_rest_of_a_motion_with_stick_and_bounce_is_the_same(point, start, state, cutting):
+    kick = STOPPED if point is POINT else KICK
+    options = {"cutting": cutting, "rtol": 1e-11}
+    end = start + (20.0 if point is POINT else 3.0)
+    whole = simulate(point, duration=end, initial=kick, **options)
+    assert held_at(whole.at([start])) == state
     going_on = Scenario(start=whole.past(start))
-    rest = simulate(POINT, duration=45.0 - start, scenario=going_on, **options)
-    assert apart(whole, rest, start) < 1e-8
-    assert [e.name for e in rest.events] == [e.name for e in whole.events if e.time > start]
+    rest = simulate(point, duration=end - start, scenario=going_on, **options)
+    assert apart(whole, rest, start) < 1e-7
+    later = [e for e in whole.events if e.time > start]
+    assert [e.name for e in rest.events] == [e.name for e in later]
+    assert len(later) > 4
+    np.testing.assert_allclose(
+        [e.time + start for e in rest.events], [e.time for e in later], atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("extra", [{}, {"actuator_lag": 0.1, "rate_limit": 2.0}], ids=str)
