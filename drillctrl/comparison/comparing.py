@@ -160,8 +160,12 @@ def _subjects(
 ) -> list[tuple[str, Design, bool]]:
     """Design and analyse the candidates, the open loop first."""
     subjects = [(OPEN_LOOP, analyze(point), False)]
-    for structure in structures:
-        chosen = preset_structure(structure) if isinstance(structure, str) else structure
+    designed = [preset_structure(s) if isinstance(s, str) else s for s in structures]
+    known = dict.fromkeys(name for chosen in designed for name in chosen.entry_names)
+    for name in bounds or {}:
+        if name not in ("K1", "K2", *known):
+            raise InputError("bound", name, f"on one of K1, K2, {', '.join(known)}")
+    for chosen in designed:
         tell(f"design of {chosen.name}")
         mine = {
             name: limits
@@ -283,9 +287,9 @@ def _chart(
 def _rank(row: Row, sort: str) -> float:
     value: Any = row.to_dict()[sort]
     if isinstance(value, dict):
-        # How near either end comes, as a share of the present delay.
-        longer = value["longer"]
-        value = min(1.0 - value["shorter"], math.inf if longer is None else longer - 1.0)
+        from drillctrl.comparison.text import delay_room
+
+        value = delay_room(value)
     if value is None:
         return math.inf
     return float(-value if SORTS[sort] else value)

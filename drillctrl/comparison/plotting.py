@@ -27,8 +27,10 @@ def _candidates(comparison: Comparison) -> list[tuple[Row, str, str]]:
     return [(row, PALETTE[i % len(PALETTE)], STYLES[i % len(STYLES)]) for i, row in enumerate(rows)]
 
 
-def plot_responses(comparison: Comparison, name: str = "x", ax: Axes | None = None) -> Axes:
-    """Draw the nonlinear motion of each stable candidate after the disturbance.
+def plot_responses(
+    comparison: Comparison, name: str = "x", ax: Axes | None = None, model: str = "nonlinear"
+) -> Axes:
+    """Draw the motion of each stable candidate after the disturbance.
 
     Parameters
     ----------
@@ -38,21 +40,26 @@ def plot_responses(comparison: Comparison, name: str = "x", ax: Axes | None = No
         ``"x"``, ``"theta"``, or ``"torque"`` for the control.
     ax : Axes, optional
         By default new ones.
+    model : {"nonlinear", "linear"}
+        Which motion.
     """
     ax = new_axes() if ax is None else ax
     longest = 10.0
     for row, colour, style in _candidates(comparison):
-        if row.nonlinear is None or not row.design.stable:
+        response = row.nonlinear if model == "nonlinear" else row.linear
+        if response is None or not row.design.stable:
             continue
-        run = row.nonlinear.run
-        longest = max(longest, row.nonlinear.settling_time or 0.25 * run.duration)
+        run = response.run
+        longest = max(longest, response.settling_time or 0.25 * run.duration)
         motion = run.on_steps(5)
         values = getattr(motion, name)
         ax.plot(motion.times, values, style, color=colour, linewidth=1.1, label=row.label)
     ax.set_xlim(0.0, 1.2 * longest)
     ax.set_xlabel("dimensionless time t")
     ax.set_ylabel({"theta": "θ", "torque": "control u"}.get(name, name))
-    ax.set_title("Nonlinear motion after the disturbance, stable loops", fontsize="medium")
+    ax.set_title(
+        f"{model.capitalize()} motion after the disturbance, stable loops", fontsize="medium"
+    )
     ax.legend(loc="best", fontsize="small")
     return ax
 
@@ -103,8 +110,10 @@ def plot_dominant_roots(comparison: Comparison, ax: Axes | None = None) -> Axes:
 
 
 def plot_areas(comparison: Comparison, ax: Axes | None = None) -> Axes | None:
-    """Draw where the gains of each candidate are stable; None without charts."""
-    charts = {row.label: row.chart for row in comparison.rows[:_SHOWN] if row.chart is not None}
+    """Draw where the gains of each candidate, and no gains, are stable; None without charts."""
+    shown = [row for row, _, _ in _candidates(comparison)][: _SHOWN - 1]
+    shown += [row for row in comparison.rows if row.design.structure is None]
+    charts = {row.label: row.chart for row in shown if row.chart is not None}
     if not charts:
         return None
     ax = plot_charts(charts, ax)

@@ -12,7 +12,7 @@ from drillctrl.comparison.plotting import (
     plot_nyquist,
     plot_responses,
 )
-from drillctrl.comparison.text import COLUMNS, LEGEND, cells, point_text, sentences
+from drillctrl.comparison.text import COLUMNS, LEGEND, cells, gains_text, point_text, sentences
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ figure { margin: 0; break-inside: avoid; } figure img { width: 100%; }
 @media print {
   @page { size: A4 landscape; margin: 12mm; }
   body { margin: 0; max-width: none; font-size: 10px; }
-  table { font-size: 8px; } .wide { overflow: visible; }
+  table { font-size: 9px; } .wide { overflow: visible; } .small { font-size: 8px; }
+  h2 { margin-top: 0.8rem; } figure img { max-height: 82mm; object-fit: contain; }
 }
 </style>
 </head>
@@ -94,6 +95,7 @@ def comparison_html(comparison: Comparison) -> str:
         raise InputError("report", "HTML", "installed: pip install 'drillctrl[report]'") from None
     figures = [
         ("Stability charts", plot_areas(comparison)),
+        ("Linear axial motion", plot_responses(comparison, "x", model="linear")),
         ("Axial motion", plot_responses(comparison, "x")),
         ("Control", plot_responses(comparison, "torque")),
         ("Nyquist curves", plot_nyquist(comparison)),
@@ -113,8 +115,8 @@ def comparison_html(comparison: Comparison) -> str:
             (
                 label,
                 ", ".join(one.structure.outputs),
-                one.K1.ravel().tolist(),
-                one.K2.ravel().tolist(),
+                gains_text(one.K1),
+                gains_text(one.K2),
             )
             for label, one in designs
             if one.structure is not None

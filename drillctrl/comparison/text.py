@@ -6,6 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.operating_point import RigPoint
+from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:
     from drillctrl.comparison.comparing import Comparison
@@ -31,9 +32,10 @@ LEGEND = (
     "α: spectral abscissa; radius: relative error of the plant's matrices that destabilises; "
     "delay ×: factors of the delay between which the loop is stable; peak S: peak sensitivity; "
     "max|u|, max|x|, settles: linear motion after the disturbance, to 2 %; nonlinear: the same "
-    "of the nonlinear motion; stick: its share of torsional stick at the end; basin: multiple of "
-    "the disturbance that still settles (up to 16); Δψ: relative change of the rock's strength "
-    "that destabilises; area, ratio: where these gains are stable, and against no control. "
+    "of the nonlinear motion, or the period T of the orbit that it ends in; stick: its share of "
+    "torsional stick at the end; basin: multiple of the disturbance that still settles (up to "
+    "16); Δψ: relative change of the rock's strength that destabilises; area, ratio: where these "
+    "gains are stable, and against no control. "
     "–: does not exist or does not settle."
 )
 
@@ -43,7 +45,9 @@ def cells(fields: dict[str, Any]) -> list[str]:
     found = []
     for _, name, form in COLUMNS:
         value = fields[name]
-        if value is None:
+        if name == "nonlinear_settling_time" and value is None and fields["period"] is not None:
+            found.append(f"T {fields['period']:.4g}")
+        elif value is None:
             found.append("–")
         elif name == "delay_margin":
             longer = "any" if value["longer"] is None else f"{value['longer']:.3g}"
@@ -58,6 +62,11 @@ def point_text(comparison: Comparison) -> str:
     given = comparison.point
     point = given.operating_point() if isinstance(given, RigPoint) else given
     return f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
+
+
+def gains_text(gains: FloatArray) -> str:
+    """Return gains, row by row, to the digits that a person reads."""
+    return ", ".join(f"{value:.6g}" for value in gains.ravel())
 
 
 def comparison_text(comparison: Comparison) -> str:
@@ -76,10 +85,13 @@ def comparison_text(comparison: Comparison) -> str:
     lines.append("")
     for one in comparison.rows:
         if one.design.structure is not None:
-            now, past = (K.ravel().tolist() for K in (one.design.K1, one.design.K2))
+            now, past = (gains_text(K) for K in (one.design.K1, one.design.K2))
             word = "designed" if one.designed else "given"
-            lines.append(f"{one.label} ({word}): K1 = {now}, K2 = {past}")
-    lines += ["", *sentences(comparison), ""]
+            lines.append(f"{one.label} ({word}): K1 = ({now}), K2 = ({past})")
+    lines.append("")
+    for text in sentences(comparison):
+        lines += textwrap.wrap(text, 100)
+    lines.append("")
     lines += textwrap.wrap(LEGEND, 100)
     return "\n".join(lines)
 
@@ -110,5 +122,15 @@ def sentences(comparison: Comparison) -> list[str]:
         ):
             if mine[name] and fields[name]:
                 parts.append(f"{mine[name] / fields[name]:.3g} times {words}")
+        if mine["delay_margin"] and fields["delay_margin"]:
+            nearest = [delay_room(f["delay_margin"]) for f in (mine, fields)]
+            parts.append(f"{nearest[0] / nearest[1]:.3g} times the delay margin")
         found.append(f"{best.label} {parts[0]}, with {', '.join(parts[1:])}.")
     return found
+
+
+def delay_room(margin: dict[str, float | None]) -> float:
+    """Return the smallest relative change of the delay that destabilises."""
+    shorter, longer = margin["shorter"], margin["longer"]
+    assert shorter is not None
+    return min(1.0 - shorter, float("inf") if longer is None else longer - 1.0)

@@ -159,7 +159,7 @@ def test_the_page_is_whole_and_needs_nothing_else(at_f):
     page.feed(text)
     assert not page.open
     assert not page.links
-    assert len(page.images) == 4
+    assert len(page.images) == 5
     for image in page.images:
         assert base64.b64decode(image.partition(",")[2]).lstrip().startswith(b"<?xml")
     assert text == at_f.to_html()
@@ -213,3 +213,9 @@ def test_charts_give_areas_and_ratios(point_c):
 def test_a_given_row_may_not_bear_the_name_of_another(point_c):
     with pytest.raises(InputError, match="structures"):
         compare(point_c, ["p"], given=[("p", "p", [-1.0], None)], region=None)
+
+
+def test_a_bound_on_no_gain_is_refused():
+    point = OperatingPoint(10.0, 12.0, 14.0)
+    with pytest.raises(InputError, match="bound = theta_typo"):
+        compare(point, ["p", "case1"], bounds={"theta_typo": (-1.0, 1.0)})
