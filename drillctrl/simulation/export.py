@@ -11,6 +11,7 @@ import numpy as np
 from drillctrl.errors import InputError
 from drillctrl.files import replacing
 from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.rig_units import SI_UNITS
 
 ENDINGS = (".csv", ".npz", ".parquet")
 
@@ -32,12 +33,14 @@ def check_export_path(path: str | Path) -> None:
 def export_motion(simulation: Simulation, path: str | Path) -> None:
     """Write the motion at the integrator's own steps, whole or not at all.
 
+    That of a rig is written in SI units, any other dimensionless.
+
     Parameters
     ----------
     simulation : Simulation
         A run.
     path : str or Path
-        ``.csv`` (a comment line, then a header), ``.npz`` (one array a column) or
+        ``.csv`` (a comment line with the units, then a header), ``.npz`` (one array a column) or
         ``.parquet`` (needs pyarrow).
 
     Raises
@@ -48,7 +51,11 @@ def export_motion(simulation: Simulation, path: str | Path) -> None:
         If the file cannot be written.
     """
     check_export_path(path)
-    columns = simulation.motion.columns()
+    if simulation.rig is None:
+        columns, units = simulation.motion.columns(), "dimensionless"
+    else:
+        columns = simulation.in_rig_units().columns()
+        units = ", ".join(f"{name} in {unit}" for name, unit in SI_UNITS.items())
     ending = Path(path).suffix.lower()
     with replacing(path) as file:
         if ending == ".npz":
@@ -60,7 +67,7 @@ def export_motion(simulation: Simulation, path: str | Path) -> None:
             pyarrow.parquet.write_table(pyarrow.table(columns), file)
         else:
             text = io.StringIO()
-            text.write(f"# drillctrl simulation, dimensionless; {simulation.point!r}\n")
+            text.write(f"# drillctrl simulation, {units}; {simulation.point!r}\n")
             writer = csv.writer(text, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))

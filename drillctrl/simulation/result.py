@@ -12,9 +12,12 @@ import numpy.typing as npt
 
 from drillctrl.errors import InputError
 from drillctrl.operating_point import OperatingPoint
+from drillctrl.rig import Rig
 from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.past import Past, past_of
+from drillctrl.simulation.rig_units import RigMotion, in_rig_units
+from drillctrl.simulation.rock_face import RockFace, rock_face
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.summary import Summary, summarise
 
@@ -131,6 +134,8 @@ class Simulation:
         Steps that were repeated; evaluations of the right-hand side.
     elapsed_seconds : float
         Wall time of the integration.
+    rig : Rig or None
+        Where the run was of a `RigPoint`.
     """
 
     point: OperatingPoint
@@ -148,6 +153,7 @@ class Simulation:
     _settings: Mapping[str, Any] = field(repr=False)
     _history: Mapping[str, Any] = field(repr=False)
     _first: int = field(default=1, repr=False)
+    rig: Rig | None = field(default=None, repr=False)
 
     @functools.cached_property
     def _compiled(self) -> tuple[Any, Any]:
@@ -232,6 +238,29 @@ class Simulation:
         on_rock = values.pop("contact") > 0.0
         modes = {"contact": on_rock, "stuck": stuck & nonlinear, "held": held & nonlinear}
         return Motion(times=times, **values, **modes)
+
+    def in_rig_units(self, times: npt.ArrayLike | None = None) -> RigMotion:
+        """Return the motion of a rig in SI units.
+
+        Parameters
+        ----------
+        times : array_like, optional
+            In seconds; by default the integrator's own steps.
+
+        Raises
+        ------
+        InputError
+            If an instant is outside the run, or the run was not of a `RigPoint`.
+        """
+        if self.rig is None:
+            raise InputError("point", repr(self.point), "a RigPoint, for results in rig units")
+        unit = self.rig.time_scale
+        motion = self.motion if times is None else self.at(np.asarray(times, dtype=float) / unit)
+        return in_rig_units(motion, self.point, self.rig)
+
+    def rock_face(self, time: float, count: int = 181) -> RockFace:
+        """Return the rock ahead of a blade at an instant; see `simulation.rock_face`."""
+        return rock_face(self, time, count)
 
     def past(self, time: float | None = None) -> Past:
         """Return what the run has left behind at an instant, to start another one from.

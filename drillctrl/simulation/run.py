@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 
 from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.operating_point import OperatingPoint, RigPoint
 from drillctrl.simulation.build import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
@@ -68,7 +68,7 @@ def checked_run(
 
 
 def simulate(
-    point: OperatingPoint,
+    point: OperatingPoint | RigPoint,
     controller: Controller | None = None,
     *,
     duration: float = 200.0,
@@ -85,8 +85,9 @@ def simulate(
 
     Parameters
     ----------
-    point : OperatingPoint
-        Where the rig drills at the start.
+    point : OperatingPoint or RigPoint
+        Where the rig drills at the start. All else is dimensionless either way; the result
+        of a `RigPoint` can be read in rig units.
     controller : Controller, optional
         Torque (or axial) feedback.
     duration : float
@@ -125,6 +126,9 @@ def simulate(
     cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
     over what it had cut already.
     """
+    rig = point.rig if isinstance(point, RigPoint) else None
+    if isinstance(point, RigPoint):
+        point = point.operating_point()
     scenario, duration, rtol, atol, max_steps = checked_run(
         point,
         scenario,
@@ -183,4 +187,5 @@ def simulate(
         _settings=settings._asdict(),
         _history=history._asdict(),
         _first=standing.first,
+        rig=rig,
     )
