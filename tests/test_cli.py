@@ -1,4 +1,5 @@
 import json
+import math
 import subprocess
 import sys
 
@@ -114,6 +115,22 @@ BAD = [
     (["simulate", "--K1", "1"], "--structure = (missing)"),
     (["simulate", "--out", "motion.xls"], "out = motion.xls"),
     (["simulate", "--model", "magic"], "model = magic"),
+    (["simulate", "--change", "omega0=4"], "--change = omega0=4"),
+    (["simulate", "--change", "t=5,speed=100 rpm"], "--change = t=5,speed=100 rpm"),
+    (["simulate", "--change", "t=5,psi=nan"], "psi = nan"),
+    (["simulate", "--duration", "5 s"], "--duration = 5 s"),
+    (["simulate", "--duration", "0"], "duration = 0.0"),
+    (["simulate", "--start", "moon"], "--start = moon"),
+    (["simulate", "--figure", "pie"], "--figure = pie"),
+    (["simulate", "--figure", "face", "--model", "linear"], "--figure = face"),
+    (["simulate", "--period", "0.1"], "--structure = (missing)"),
+    (["simulate", "--table", "none.csv"], "table = none.csv"),
+    (["simulate", "--table", "none.csv", "--K1", "3"], "--K1 = 3"),
+    (["simulate", "--structure", "p", "--K1", "1", "--limit", "-3"], "limit = -3.0"),
+    (["simulate", "--structure", "p", "--K1", "1", "--limit", "3 kN*m"], "--limit = 3 kN*m"),
+    (["simulate", "--structure", "p", "--K1", "1", "--noise", "theta=a"], "--noise = theta=a"),
+    (["simulate", "--structure", "p", "--K1", "1", "--delay", "now"], "delay = now"),
+    (["simulate", "--floquet", "--delta0", "0.5", "--duration", "50"], "run = 50 time units"),
     (["invent"], "invent"),
 ]
 
@@ -187,6 +204,71 @@ def test_simulate_with_control_and_npz(capsys, tmp_path):
     assert result["max_abs_u"] == pytest.approx(4.91, abs=5e-3)
     with np.load(table, allow_pickle=False) as columns:
         assert np.abs(columns["x"]).max() == pytest.approx(2.71, abs=5e-3)
+
+
+def test_simulate_a_controller_as_it_runs_on_a_rig(capsys, tmp_path):
+    from drillctrl import Controller, RigPoint, simulate, table1
+
+    rig = table1()
+    unit = rig.time_scale
+    motion = tmp_path / "motion.csv"
+    status, out, _ = run(
+        capsys, "simulate", "--rig", "table1", "--speed", "270 rpm", "--rop", "45 m/h",
+        "--structure", "case2", "--K1", "-5.03,-4.91", "--K2", "-1.67,-0.31",
+        "--period", "10 ms", "--actuator-lag", "20 ms", "--limit", "1 kN*m", "--rate-limit", 5,
+        "--noise", "theta=0.001", "--seed", 4, "--activation", "0.5 s",
+        "--duration", "4 s", "--out", motion, "--json",
+    )  # fmt: skip
+    assert status == 0
+    fields = json.loads(out)
+    assert fields["time_scale"] == unit
+    assert fields["duration"] == pytest.approx(4.0 / unit)
+    controller = Controller(
+        "case2", [-5.03, -4.91], [-1.67, -0.31], activation=0.5 / unit, period=0.01 / unit,
+        actuator_lag=0.02 / unit, limit=1e3 / rig.torsional_stiffness, rate_limit=5.0,
+        noise={"theta": 0.001}, seed=4,
+    )  # fmt: skip
+    point = RigPoint(rig, 270.0 * 2.0 * math.pi / 60.0, 45.0 / 3600.0)
+    same = simulate(point, controller, duration=4.0 / unit, initial={"dx": 1.0, "dtheta": 1.0})
+    assert fields["max_abs_u"] == pytest.approx(same.summary.max_abs_u, rel=1e-9)
+    assert fields["steps"] == same.steps
+    last = motion.read_text().splitlines()[-1].split(",")
+    assert float(last[0]) == pytest.approx(4.0)
+    text = run(
+        capsys, "simulate", "--rig", "table1", "--speed", "270 rpm", "--rop", "45 m/h",
+        "--duration", "4 s",
+    )[1]  # fmt: skip
+    assert "= 4 s, done" in text
+    assert "rpm" in text
+
+
+def test_simulate_changes_and_a_table(capsys, tmp_path):
+    gains = tmp_path / "gains.csv"
+    run(capsys, "table", "--omega0", "8:14:2", "--delta0", "1:4:2", "--out", gains)
+    arguments = ["simulate", "--delta0", 2.5, "--table", gains, "--duration", 150]
+    status, out, err = run(capsys, *arguments, "--change", "t=40,omega0=12,duration=5")
+    assert (status, err) == (0, "")
+    assert "steady by the end, at the changed point" in out
+    _, out, err = run(capsys, *arguments, "--change", "t=40,psi=20")
+    assert "does not vouch for" in err
+    assert "ψ = 20 from t = 40" in err
+    assert json.loads(run(capsys, *arguments, "--json")[1])["settled"]
+
+
+def test_simulate_multipliers_and_figures(capsys, tmp_path):
+    for name in ("motion", "phase", "axial-phase", "linear", "face"):
+        figure = tmp_path / f"{name}.png"
+        status, *_ = run(
+            capsys, "simulate", "--delta0", 2.5, "--duration", 100, "--plot", figure,
+            "--figure", name,
+        )  # fmt: skip
+        assert status == 0
+        assert figure.read_bytes().startswith(b"\x89PNG")
+    arguments = ["simulate", "--delta0", 2.5, "--duration", 150, "--floquet"]
+    assert "Multipliers  1, 0.1498" in run(capsys, *arguments)[1]
+    found = json.loads(run(capsys, *arguments, "--json")[1])
+    assert found["multipliers"][1]["real"] == pytest.approx(0.14984, abs=2e-5)
+    assert found["multiplier_error"] < 1e-6
 
 
 def test_every_verb_has_help_with_an_example(capsys):

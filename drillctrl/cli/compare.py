@@ -64,7 +64,7 @@ def compare_command(
         raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
     where, names = read_point(point), [name.strip() for name in structures.split(",")]
     candidates = [read_given(text) for text in given]
-    from drillctrl.cli.simulate import read_initial
+    from drillctrl.cli.running import read_numbers
     from drillctrl.comparison.comparing import REGION, compare
 
     with _progress() as progress:
@@ -73,7 +73,7 @@ def compare_command(
             [name for name in names if name],
             given=candidates,
             bounds=read_bounds(bound),
-            disturbance=read_initial(initial),
+            disturbance=read_numbers("--initial", initial, "dx=1,dtheta=1"),
             duration=duration,
             region=None if no_charts else REGION,
             sort=sort,

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from drillctrl.cli.gains import read_gains
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.running import (
+    controller_options,
+    read_controller,
+    read_duration,
+    read_scenario,
+)
 from drillctrl.errors import InputError
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def read_initial(text: str) -> dict[str, float]:
-    """Return a perturbation from a text such as ``dx=1,dtheta=1``; empty for none."""
-    initial = {}
-    for part in filter(None, (piece.strip() for piece in text.split(","))):
-        name, _, value = part.partition("=")
-        try:
-            initial[name.strip()] = float(value)
-        except ValueError:
-            raise InputError("--initial", text, "of the form dx=1,dtheta=1") from None
-    return initial
+    from drillctrl.simulation.result import Simulation
+
+FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
 
 
 @click.command(name="simulate")
 @point_options
-@click.option("--structure", help="p, case1, pd or case2; without it, no control.")
-@click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
-@click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
-@click.option("--activation", type=float, default=0.0, help="Time at which control begins.")
+@controller_options
 @click.option("--model", default="nonlinear", show_default=True, help="nonlinear or linear.")
 @click.option(
     "--cutting",
@@ -37,31 +35,49 @@ def read_initial(text: str) -> dict[str, float]:
     show_default=True,
     help="Rock face: multiple (deepest of all passes) or single (the last pass).",
 )
-@click.option("--duration", type=float, default=200.0, show_default=True, help="Time units.")
+@click.option(
+    "--duration",
+    metavar="TIME",
+    default="200",
+    show_default=True,
+    help="Dimensionless, as every TIME; with a rig also '60 s'.",
+)
+@click.option("--start", default="steady", show_default=True, help="steady (drilling) or rest.")
 @click.option(
     "--initial",
-    default="dx=1,dtheta=1",
-    show_default=True,
-    help="Perturbation of steady drilling: x, dx, theta, dtheta.",
+    help="Perturbation at t = 0: x, dx, theta, dtheta (default dx=1,dtheta=1; none from rest).",
+)
+@click.option(
+    "--change",
+    multiple=True,
+    metavar="T=TIME,…",
+    help="Of drive or rock: 't=50,omega0=9', 't=50,psi=18,duration=10'; may be repeated.",
 )
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative error.")
+@click.option("--floquet", is_flag=True, help="Floquet multipliers of the orbit at the end.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Motion: FILE.csv, .npz or .parquet.")
-@click.option("--plot", type=click.Path(), help="Draw the motion: FILE.png, .svg, .pdf.")
+@click.option("--plot", type=click.Path(), help="Draw a figure: FILE.png, .svg, .pdf.")
+@click.option(
+    "--figure",
+    default="motion",
+    show_default=True,
+    help="motion, phase, axial-phase, linear (against it), face (of the rock, at the end).",
+)
 def simulate_command(
-    structure: str | None,
-    k1: str | None,
-    k2: str | None,
-    activation: float,
     model: str,
     cutting: str,
-    duration: float,
-    initial: str,
+    duration: str,
+    start: str,
+    initial: str | None,
+    change: tuple[str, ...],
     rtol: float,
+    floquet: bool,
     as_json: bool,
     out: str | None,
     plot: str | None,
-    **point: Any,
+    figure: str,
+    **options: Any,
 ) -> None:
     """Try gains, or none, on the nonlinear drill string: stick, slip and bounce.
 
@@ -69,11 +85,19 @@ def simulate_command(
     Examples:
       drillctrl simulate --omega0 10 --delta0 2.5 --psi 14 --duration 200 --plot motion.png
       drillctrl simulate --delta0 2.5 --structure case1 --K1 -3.82 --K2 3.61 --out motion.csv
+      drillctrl simulate --delta0 2.5 --floquet --plot portrait.png --figure phase
+      drillctrl simulate --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case1
+        --K1 -3.82 --K2 3.61 --period "10 ms" --limit "3 kN*m" --duration "30 s"
     """
     check_folder("--out", out)
     check_figure(plot)
-    where = read_point(point)
-    from drillctrl.simulation import Controller, simulate
+    if figure not in FIGURES:
+        raise InputError("--figure", figure, f"one of {', '.join(FIGURES)}")
+    if start not in ("steady", "rest"):
+        raise InputError("--start", start, "steady or rest")
+    where = read_point(options)
+    from drillctrl.operating_point import RigPoint
+    from drillctrl.simulation import simulate
     from drillctrl.simulation.build import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
@@ -81,38 +105,57 @@ def simulate_command(
 
     if out is not None:
         check_export_path(out)
-    from drillctrl.operating_point import RigPoint
-
-    rig_point = where if isinstance(where, RigPoint) else None
+    rig = where.rig if isinstance(where, RigPoint) else None
     groups = where.operating_point() if isinstance(where, RigPoint) else where
-    controller = None
-    if structure is not None:
-        gains = read_gains("K1", k1), read_gains("K2", k2)
-        if gains[0] is None:
-            raise InputError("--K1", "(missing)", f"given for structure {structure}")
-        controller = Controller(structure, gains[0], gains[1], activation=activation)
-    elif k1 is not None or k2 is not None:
-        raise InputError("--structure", "(missing)", "given together with gains")
-    start = read_initial(initial)
-    checked_run(groups, duration=duration, initial=start, model=model, cutting=cutting, rtol=rtol)
+    length = read_duration(duration, rig)
+    kick = initial if initial is not None else "" if start == "rest" else "dx=1,dtheta=1"
+    scenario = read_scenario(start, kick, change, groups, rig)
+    controller = read_controller(options, groups, scenario, length, rig)
+    common: dict[str, Any] = {
+        "scenario": scenario,
+        "duration": length,
+        "cutting": cutting,
+        "rtol": rtol,
+    }
+    checked_run(groups, **common, model=model)
+    if figure in ("linear", "face") and model == "linear":
+        raise InputError("--figure", figure, "motion or phase for the linear model")
+    if figure == "linear":
+        checked_run(groups, **common, model="linear")
     if not is_compiled():
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
-    run = simulate(
-        groups,
-        controller,
-        duration=duration,
-        initial=start,
-        model=model,
-        cutting=cutting,
-        rtol=rtol,
-    )
+
+    def again(model: str) -> Simulation:
+        return simulate(where, controller, **common, model=model)
+
+    run = again(model)
+    multipliers = None
+    if floquet:
+        from drillctrl.simulation.floquet import floquet as multipliers_of
+
+        multipliers = multipliers_of(run)
     if out is not None:
         writing("--out", out, lambda: export_motion(run, out))
     if plot is not None:
-        from drillctrl.simulation.plotting import plot_motion
-
-        write_figure(plot, plot_motion(run))
+        write_figure(plot, _drawn(figure, run, again))
     if as_json:
-        click.echo(json_text(simulation_fields(run)))
+        click.echo(json_text(simulation_fields(run, multipliers)))
     else:
-        click.echo(simulation_summary(run, rig_point))
+        click.echo(simulation_summary(run, multipliers))
+
+
+def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure:
+    from drillctrl.simulation import plotting
+
+    if figure == "motion":
+        return plotting.plot_motion(run)
+    if figure == "linear":
+        ax = plotting.plot_against_linear(run, again("linear"))
+    elif figure == "face":
+        ax = plotting.plot_rock_face(run)
+    else:
+        plane = "torsion" if figure == "phase" else "axial"
+        ax = plotting.plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
+    drawn = ax.get_figure(root=True)
+    assert drawn is not None
+    return drawn

@@ -136,7 +136,7 @@ def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: 
         raise InputError("run", "changed on the way", "one that has come to an orbit since")
     orbit = limit_cycle(run, since=0.5 * float(run.times[-1]))
     if orbit is None:
-        raise InputError("run", repr(run), "one whose returns close: a longer or periodic motion")
+        raise InputError("run", _length(run), "longer, or of a motion that repeats")
     section = _quiet_instant(run, orbit.period)
     found, residuals = multipliers_at(
         run, section, orbit.period, directions=directions, size=size, seed=seed
@@ -214,6 +214,10 @@ def _check_controller(controller: Controller | None) -> None:
         )
 
 
+def _length(run: Simulation) -> str:
+    return f"{run.duration:g} time units"
+
+
 def _quiet_instant(run: Simulation, period: float) -> float:
     """Return the middle of the longest stretch without events in the last period but one."""
     end = float(run.times[-1])
@@ -226,7 +230,7 @@ def _quiet_instant(run: Simulation, period: float) -> float:
         saturated = run.phases("saturated")
         free &= np.array([not any(a <= t <= b for a, b in saturated) for t in middles])
     if not free.any():
-        raise InputError("run", repr(run), "one that turns freely for some of its period")
+        raise InputError("run", _length(run), "one that turns freely for some of its period")
     return float(middles[np.where(free, np.diff(edges), 0.0).argmax()])
 
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from drillctrl import units
-from drillctrl.operating_point import RigPoint
 from drillctrl.simulation.result import Simulation
 
+if TYPE_CHECKING:
+    from drillctrl.simulation.floquet import Floquet
 
-def simulation_fields(run: Simulation) -> dict[str, Any]:
+
+def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> dict[str, Any]:
     """Return the JSON fields of ``simulate``."""
     summary = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in run.summary.as_dict().items()
     }
     controller = run.controller
-    return {
+    fields = {
         "schema": "drillctrl/simulate/1",
         "operating_point": dataclasses.asdict(run.point),
         "structure": controller.feedback.name if controller else None,  # type: ignore[union-attr]
@@ -26,27 +30,64 @@ def simulation_fields(run: Simulation) -> dict[str, Any]:
         "cutting": run.cutting,
         "duration": run.duration,
         "status": run.status,
+        "time_scale": None if run.rig is None else run.rig.time_scale,
+        "saturated_fraction": _saturated(run),
         **summary,
     }
+    if multipliers is not None:
+        fields["multipliers"] = [
+            {"real": float(value.real), "imag": float(value.imag), "residual": float(residual)}
+            for value, residual in zip(multipliers.multipliers, multipliers.residuals, strict=True)
+        ]
+        fields["multiplier_error"] = multipliers.trivial_error
+    return fields
 
 
-def simulation_summary(run: Simulation, rig_point: RigPoint | None) -> str:
-    """Return the summary of a run for people, in rig units too where a rig was given."""
-    s, p = run.summary, run.point
-    time, speed = "", ""
-    if rig_point is not None:
-        unit = rig_point.rig.time_scale
-        if s.period is not None:
-            time = f" = {s.period * unit:.4g} s"
+def _saturated(run: Simulation) -> float:
+    """Return the share of the whole run in which a control is at a limit."""
+    end = float(run.times[-1])
+    return sum(b - a for a, b in run.phases("saturated")) / end if end > 0.0 else 0.0
+
+
+def _steady(run: Simulation) -> str:
+    """Say when the motion had settled."""
+    after = run.summary.settling_time
+    told = "settles to steady drilling"
+    return told if after is None else f"{told}, to 2 % after {after:.4g}{_seconds(run, after)}"
+
+
+def _resting(run: Simulation) -> bool:
+    """Whether the rates hardly change any more in the last tenth of the run.
+
+    Where the drive was changed the positions go on.
+    """
+    motion, tail = run.motion, run.on_steps(3, 0.9 * float(run.times[-1]))
+    return all(
+        float(np.ptp(getattr(tail, name))) <= 1e-3 * float(np.ptp(getattr(motion, name)))
+        for name in ("dx", "dtheta")
+    )
+
+
+def _seconds(run: Simulation, time: float) -> str:
+    return "" if run.rig is None else f" = {time * run.rig.time_scale:.4g} s"
+
+
+def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> str:
+    """Return the summary of a run for people, in rig units too where it was of a rig."""
+    s, p, rig = run.summary, run.point, run.rig
+    speed = ""
+    if rig is not None:
         low, high = (
-            units.from_si(v / unit, units.ROTARY_SPEED, "rpm")
+            units.from_si(v / rig.time_scale, units.ROTARY_SPEED, "rpm")
             for v in (s.bit_speed_min, s.bit_speed_max)
         )
         speed = f" = {low:.4g} to {high:.4g} rpm"
     if s.settled:
-        motion = "settles to steady drilling"
+        motion = _steady(run)
     elif s.period is not None:
-        motion = f"periodic orbit, period {s.period:.6g}{time}"
+        motion = f"periodic orbit, period {s.period:.6g}{_seconds(run, s.period)}"
+    elif run.scenario.changes and _resting(run):
+        motion = "steady by the end, at the changed point"
     else:
         motion = "neither settled nor periodic by the end"
     kinds = []
@@ -58,15 +99,45 @@ def simulation_summary(run: Simulation, rig_point: RigPoint | None) -> str:
         kinds.append("the bit leaves the rock")
     lines = [
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
-        ("Run", f"{run.model} model, {run.duration:g} time units, {run.status}"),
+        ("Run", f"{run.model} model, {run.duration:g} time units"
+         f"{_seconds(run, run.duration)}, {run.status}"),
         ("Motion", motion),
         ("", ", ".join(kinds) if kinds else "no stick, contact kept"),
+    ]  # fmt: skip
+    if multipliers is not None:
+        values = ", ".join(_complex(value) for value in multipliers.multipliers[:5])
+        lines.append(("Multipliers", f"{values} (1 found within {multipliers.trivial_error:.0e})"))
+    lines += [
         ("Bit speed", f"{s.bit_speed_min:.6g} to {s.bit_speed_max:.6g}{speed}"),
-        ("Axial", f"x from {s.axial_min:.6g} to {s.axial_max:.6g}"),
-        ("Delay", f"at most {s.delay_max:.6g} (steady {p.delay:.6g})"),
+        ("Axial", f"x from {s.axial_min:.6g} to {s.axial_max:.6g}{_millimetres(run)}"),
+        ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
     ]
     if run.controller is not None:
-        lines.append(("Control", f"largest |u| = {s.max_abs_u:.6g}"))
+        torque = ""
+        if rig is not None and run.controller.feedback.inputs == ("torque",):  # type: ignore[union-attr]
+            newton_metres = s.max_abs_u * rig.torsional_stiffness
+            torque = f" = {units.from_si(newton_metres, units.TORQUE, 'kN*m'):.4g} kN·m"
+        share = _saturated(run)
+        limited = f", at a limit for {share:.1%} of the run" if share else ""
+        lines.append(("Control", f"largest |u| = {s.max_abs_u:.6g}{torque}{limited}"))
     lines.append(("Effort", f"{s.steps} steps, {s.events} events, {s.elapsed_seconds:.3g} s"))
     width = max(len(label) for label, _ in lines) + 2
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+
+
+def _millimetres(run: Simulation) -> str:
+    if run.rig is None:
+        return ""
+    low, high = (
+        1e3 * run.rig.axial_scale * x for x in (run.summary.axial_min, run.summary.axial_max)
+    )
+    return f" = {low:.4g} to {high:.4g} mm"
+
+
+def _complex(value: complex) -> str:
+    real = f"{value.real:.5g}"
+    return (
+        real
+        if abs(value.imag) < 1e-9
+        else f"{real} {'+' if value.imag > 0 else '−'} " + (f"{abs(value.imag):.5g}i")
+    )
