@@ -44,6 +44,19 @@ def test_sampled_command_is_the_law_at_the_samples():
     assert not run.at(np.linspace(0.0, 0.99, 10)).torque.any()
 
 
+def test_after_saturation_the_command_is_the_law_at_once():
+    run = simulate(
+        POINT, Controller(*GAINS, limit=0.5), duration=40.0, initial={"dtheta": -6.0}, rtol=1e-10
+    )
+    times = np.linspace(POINT.delay, 40.0, 4001)
+    now, then = run.at(times), run.at(times - POINT.delay)
+    law = np.clip(-3.82 * now.theta + 3.61 * then.theta, -0.5, 0.5)
+    np.testing.assert_allclose(now.torque, law, atol=1e-9)
+    assert (abs(law) == 0.5).any()
+    assert (abs(law) < 0.5).any()
+    assert any(e.name == "stick" for e in run.events)
+
+
 def test_limits_hold_and_are_reached():
     limited = Controller(*GAINS, limit=0.3)
     run = simulate(POINT, limited, duration=20.0, initial=KICK)
