@@ -46,7 +46,7 @@ def test_sampled_command_is_the_law_at_the_samples():
 
 def test_after_saturation_the_command_is_the_law_at_once():
     run = simulate(
-        POINT, Controller(*GAINS, limit=0.5), duration=40.0, initial={"dtheta": -6.0}, rtol=1e-10
+        POINT, Controller(*GAINS, limit=0.5), duration=40.0, initial={"dtheta": -9.0}, rtol=1e-10
     )
     times = np.linspace(POINT.delay, 40.0, 4001)
     now, then = run.at(times), run.at(times - POINT.delay)
