@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, stable_curves
-from drillctrl.charts.gain_margin import check_gains
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
@@ -19,6 +18,7 @@ from drillctrl.charts.sweep import sweep
 from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.feedback import FeedbackStructure, preset_structure
 from drillctrl.operating_point import OperatingPoint, RigPoint
+from drillctrl.optimisation.gain_margin import check_gains
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -160,7 +160,7 @@ def stabilisable_chart(
     Notes
     -----
     Whether gains exist at a place is decided on the explicit curves of gains that hold a
-    root at the line (see `drillctrl.charts.gain_margin`), not by a search over gains.
+    root at the line (see `drillctrl.optimisation.gain_margin`), not by a search over gains.
     """
     began = time.perf_counter()
     plane = make_plane(point, x, y, None, None, None)

@@ -13,12 +13,12 @@ from collections.abc import Callable
 import numpy as np
 import scipy.optimize
 
-from drillctrl.charts.gain_margin import GainMargin, gain_margin
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.delay_system import plant_system
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.optimisation.family import loop_family
+from drillctrl.optimisation.gain_margin import GainMargin, gain_margin
 from drillctrl.spectrum.characteristic import FloatArray
 
 _DIP = 0.3

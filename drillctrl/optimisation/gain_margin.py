@@ -9,6 +9,7 @@ the curves decides, and where it vanishes lies the edge of what feedback can rea
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -43,11 +44,14 @@ class GainMargin:
         Frequency of the root that is held; NaN where none is.
     gains : array, (k,)
         The gains there.
+    places : int
+        How many places on the curves were looked at.
     """
 
     margin: float
     omega: float
     gains: FloatArray
+    places: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,14 +97,17 @@ def gain_margin(family: LoopFamily, line: float = 0.0) -> GainMargin:
         raise InputError("structure", family.feedback.name, "one with a single input")
     middle = 0.5 * (family.feedback.lower + family.feedback.upper)
     best = family.abscissa(middle)[0] - line
-    found = GainMargin(best if best < 0.0 else np.inf, float("nan"), middle)
+    found = GainMargin(best if best < 0.0 else np.inf, float("nan"), middle, 0)
+    places = 0
     pieces = _isolated(family, line) if count == 1 else [_curve(family, line)]
     pieces += _real_crossings(family, line)
     for piece in pieces:
-        margin, at, gains = _lowest(family, piece, line)
+        margin, at, gains, looked = _lowest(family, piece, line)
+        places += looked
         if margin < found.margin:
-            found = GainMargin(margin, float(piece.frequency(np.array([at]))[0]), gains)
-    return found
+            omega = float(piece.frequency(np.array([at]))[0])
+            found = GainMargin(margin, omega, gains, 0)
+    return dataclasses.replace(found, places=places)
 
 
 def _inside(family: LoopFamily, gains: FloatArray) -> np.ndarray:
@@ -110,8 +117,8 @@ def _inside(family: LoopFamily, gains: FloatArray) -> np.ndarray:
         return np.asarray(((gains >= lower - slack) & (gains <= upper + slack)).all(axis=1))
 
 
-def _lowest(family: LoopFamily, piece: _Piece, line: float) -> tuple[float, float, FloatArray]:
-    """Return the lowest next root along a piece, where, and the gains there."""
+def _lowest(family: LoopFamily, piece: _Piece, line: float) -> tuple[float, float, FloatArray, int]:
+    """Return the lowest next root along a piece, where, the gains there, and places looked at."""
 
     def values(at: FloatArray, gains: FloatArray) -> FloatArray:
         result = np.full(at.size, np.inf)
@@ -136,9 +143,9 @@ def _lowest(family: LoopFamily, piece: _Piece, line: float) -> tuple[float, floa
         gains = np.insert(gains, gaps + 1, new_gains, axis=0)
         margin = np.insert(margin, gaps + 1, new_margin)
     if margin.size == 0 or not np.isfinite(margin.min()):
-        return np.inf, float("nan"), np.full(family.feedback.lower.size, np.nan)
+        return np.inf, float("nan"), np.full(family.feedback.lower.size, np.nan), at.size
     i = int(margin.argmin())
-    return float(margin[i]), float(at[i]), gains[i]
+    return float(margin[i]), float(at[i]), gains[i], at.size
 
 
 def _promising(at: FloatArray, margin: FloatArray, target: float) -> np.ndarray:
