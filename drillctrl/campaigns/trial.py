@@ -12,6 +12,7 @@ import numpy as np
 from drillctrl.delay_system import plant_system
 from drillctrl.feedback import FeedbackStructure, close_loop
 from drillctrl.operating_point import OperatingPoint
+from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
@@ -120,24 +121,13 @@ def _basin(trial: Trial, alpha: float, duration: float, outcomes: list[str]) -> 
     """Return the sizes between which the first that does not settle lies."""
     settled = [outcome == "settled" for outcome in outcomes]
     fails = settled.index(False) if False in settled else None
-    low = trial.sizes[fails - 1] if fails else 0.0 if fails == 0 else trial.sizes[-1]
+    low = trial.sizes[-1] if fails is None else trial.sizes[fails - 1] if fails else 0.0
     high = None if fails is None else trial.sizes[fails]
-    while high is None:
-        if low >= trial.largest:
-            return [low, None]
-        size = min(2.0 * low, trial.largest)
-        if _outcome(trial, alpha, duration, size)[0] == "settled":
-            low = size
-        else:
-            high = size
-    least = trial.sizes[0] / 1024.0
-    while high > trial.sharpness * low and high > least:
-        size = float(np.sqrt(low * high)) if low > 0.0 else 0.5 * high
-        if _outcome(trial, alpha, duration, size)[0] == "settled":
-            low = size
-        else:
-            high = size
-    return [low, high]
+
+    def settles(size: float) -> bool:
+        return _outcome(trial, alpha, duration, size)[0] == "settled"
+
+    return list(basin_edge(settles, trial.sizes[0], trial.largest, trial.sharpness, low, high))
 
 
 def _outcome(trial: Trial, alpha: float, duration: float, size: float) -> tuple[str, float | None]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.design_result import Design
+from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
@@ -18,7 +19,8 @@ from drillctrl.transfer import frequency_grid, loop_transfer
 Transfer = Callable[[FloatArray], ComplexArray]
 
 MOST_FACTOR = 16.0
-_BASIN_STEPS = 6
+# Ratio of the multiples that bracket the edge of a basin.
+_SHARPNESS = 1.02
 
 
 @dataclass(frozen=True)
@@ -146,9 +148,8 @@ def respond(
 def basin(design: Design, disturbance: Mapping[str, float], duration: float) -> float | None:
     """Return the largest multiple of a disturbance after which the motion still settles.
 
-    Multiples are doubled from 1/16 to 16 until one does not settle, then the last interval
-    is bisected; 0 if even the smallest does not, 16 if all do. What lies beyond an unsettled
-    multiple is not looked at.
+    Multiples from 1/16 to 16 are looked at; 0 if even the smallest does not settle, 16 if
+    all do. What lies beyond an unsettled multiple is not looked at.
     """
     if design.point is None or not design.stable:
         return None
@@ -158,13 +159,4 @@ def basin(design: Design, disturbance: Mapping[str, float], duration: float) -> 
         found = respond(design, scaled, duration, "nonlinear")
         return found is not None and found.settling_time is not None
 
-    low, high = 0.0, 1.0 / MOST_FACTOR
-    while settles(high):
-        low = high
-        if high >= MOST_FACTOR:
-            return MOST_FACTOR
-        high *= 2.0
-    for _ in range(_BASIN_STEPS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if settles(middle) else (low, middle)
-    return low
+    return basin_edge(settles, 1.0 / MOST_FACTOR, MOST_FACTOR, _SHARPNESS)[0]
