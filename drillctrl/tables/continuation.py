@@ -20,6 +20,10 @@ Mapper = Callable[[Callable[[NodeTask], NodeDesign], Sequence[NodeTask]], Iterab
 
 _ROUNDS = 4
 _MOST_KNOWN = 4
+# Gains closer than this share of their ranges are taken to lie in one basin.
+_ONE_BASIN = 0.1
+# Excess of α over what the neighbours suggest, relative and absolute, that is looked into.
+_STANDS_OUT = (0.02, 0.01)
 
 
 def design_grid(
@@ -32,8 +36,9 @@ def design_grid(
     """Design every node of a grid.
 
     Nodes of a coarse subgrid are searched over the whole box. Those between begin at the
-    gains around them, level by level, and a node at which the gains of a neighbour are
-    better than its own, or nearly so, is designed again from there, until none is.
+    gains around them, level by level. A node at which the gains of a neighbour are better
+    than its own, or nearly so, is designed again from there, and one whose α stands out
+    from its neighbours' is searched over the whole box too, until nothing gets better.
 
     Parameters
     ----------
@@ -62,6 +67,9 @@ def design_grid(
         ]
         return sorted(run(design_node, alone), key=lambda design: design.index)
     stride = _coarse_stride(grid.shape)
+    apart = _ONE_BASIN * (structure.upper - structure.lower)
+    # The same task again would end the same.
+    tried: set[tuple[int, bytes]] = set()
     while stride >= 1:
         chosen = [
             index
@@ -69,22 +77,31 @@ def design_grid(
             if index not in found and _on_level(place, grid.shape, stride)
         ]
         tasks = [
-            NodeTask(i, grid.points[i], structure, seed, _nearby(grid.shape, i, stride, found))
+            NodeTask(
+                i, grid.points[i], structure, seed, _nearby(grid.shape, i, stride, found, apart)
+            )
             for i in chosen
         ]
+        tried.update(map(_key, tasks))
         found.update({design.index: design for design in run(design_node, tasks)})
         stride //= 2
     for _ in range(_ROUNDS):
-        tasks = _restarts(grid, structure, seed, found)
         better = 0
-        for design in run(design_node, tasks):
-            old = found[design.index]
-            if design.spectral_abscissa < old.spectral_abscissa - 1e-6:
-                found[design.index] = design
-                better += 1
+        for propose in (_restarts, _searches):
+            proposed = propose(grid, structure, seed, found)
+            tasks = [task for task in proposed if _key(task) not in tried]
+            tried.update(map(_key, tasks))
+            for design in run(design_node, tasks):
+                if design.spectral_abscissa < found[design.index].spectral_abscissa - 1e-6:
+                    found[design.index] = design
+                    better += 1
         if not better:
             break
     return [found[index] for index in range(len(grid.points))]
+
+
+def _key(task: NodeTask) -> tuple[int, bytes]:
+    return task.index, np.array(task.known).tobytes()
 
 
 def neighbours(shape: tuple[int, ...], index: int, reach: int = 1) -> list[int]:
@@ -124,24 +141,34 @@ def _on_level(place: tuple[int, ...], shape: tuple[int, ...], stride: int) -> bo
 
 
 def _nearby(
-    shape: tuple[int, ...], index: int, stride: int, found: dict[int, NodeDesign]
+    shape: tuple[int, ...],
+    index: int,
+    stride: int,
+    found: dict[int, NodeDesign],
+    apart: FloatArray,
 ) -> tuple[FloatArray, ...]:
-    """Return distinct gains of the nodes already designed around a node."""
+    """Return the gains around a node, one vector a basin."""
     if not found:
         return ()
     place = np.unravel_index(index, shape)
-    known: list[FloatArray] = []
+    basins: list[list[FloatArray]] = []
     for step in itertools.product((-stride, 0, stride), repeat=len(shape)):
         other = [int(i) + s for i, s in zip(place, step, strict=True)]
         if any(not 0 <= i < size for i, size in zip(other, shape, strict=True)):
             continue
         design = found.get(int(np.ravel_multi_index(other, shape)))
-        if design is not None and all(np.abs(design.gains - g).max() > 1e-3 for g in known):
-            known.append(design.gains)
-    if not known:
+        if design is None:
+            continue
+        home = next((b for b in basins if (np.abs(b[0] - design.gains) < apart).all()), None)
+        if home is None:
+            basins.append([design.gains])
+        else:
+            home.append(design.gains)
+    if not basins:
         nearest = min(found, key=lambda i: _distance(shape, i, index))
-        known = [found[nearest].gains]
-    return tuple(known[:_MOST_KNOWN])
+        return (found[nearest].gains,)
+    # Neighbours stand on opposite sides: their mean is closer than any of them.
+    return tuple(np.mean(basin, axis=0) for basin in basins[:_MOST_KNOWN])
 
 
 def _distance(shape: tuple[int, ...], first: int, second: int) -> int:
@@ -170,10 +197,52 @@ def _restarts(
     promise = borrowed < here - 1e-6
     # A neighbour that does much better by far other gains may sit in a better basin.
     width = structure.upper - structure.lower
-    apart = np.abs((gains[pairs[:, 0]] - gains[pairs[:, 1]]) / width).max(axis=1) > 0.1
+    apart = np.abs((gains[pairs[:, 0]] - gains[pairs[:, 1]]) / width).max(axis=1)
+    apart = apart > _ONE_BASIN
     promise |= apart & (there < here - 0.02 * np.abs(here))
     tasks = []
     for index in np.unique(pairs[promise, 0]).tolist():
         known = tuple(gains[j] for j in pairs[promise & (pairs[:, 0] == index), 1])
         tasks.append(NodeTask(index, grid.points[index], structure, seed, known[:_MOST_KNOWN]))
     return tasks
+
+
+def _searches(
+    grid: Grid, structure: FeedbackStructure, seed: int, found: dict[int, NodeDesign]
+) -> list[NodeTask]:
+    """Return tasks over the whole box for the nodes whose α stands out."""
+    alpha = np.array([found[i].spectral_abscissa for i in range(len(grid.points))])
+    relative, absolute = _STANDS_OUT
+    doubtful = excess(alpha.reshape(grid.shape)).ravel() > np.maximum(
+        relative * np.abs(alpha), absolute
+    )
+    return [
+        NodeTask(index, grid.points[index], structure, seed)
+        for index in np.flatnonzero(doubtful).tolist()
+    ]
+
+
+def excess(values: FloatArray) -> FloatArray:
+    """Return by how much each value exceeds the middle of those beside it.
+
+    Parameters
+    ----------
+    values : array
+        One a node.
+
+    Returns
+    -------
+    array
+        Half the second difference, negated: the largest over the axes, that of the next
+        node at an end; −∞ along axes of fewer than three nodes.
+    """
+    most = np.full(values.shape, -np.inf)
+    for axis in range(values.ndim):
+        if values.shape[axis] < 3:
+            continue
+        along = np.moveaxis(values, axis, 0)
+        bend = 0.5 * (2.0 * along[1:-1] - along[:-2] - along[2:])
+        # At an end a value too high bends the line the other way.
+        padded = np.concatenate([-bend[:1], bend, -bend[-1:]])
+        most = np.maximum(most, np.moveaxis(padded, 0, axis))
+    return most

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-import numpy as np
-
-from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.errors import InputError
 from drillctrl.files import write_text
-from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.tables.document import SIGN, rig_gain_units, to_document
-from drillctrl.tables.interpolation import UNSAFE
+from drillctrl.tables.sampled import SampledController, filled, sampled_controller
 from drillctrl.tables.table import GainTable
 
 REALS = ("double", "float")
@@ -63,56 +58,21 @@ def export_c(
         If a value is out of range, the structure drives more than one input, or it has
         no gains in rig units over a grid in rig units.
     """
-    step = checked_number("period", period, 0.0, 1e6, open_low=True)
-    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    count = checked_integer("ramp", ramp, 0, 10**9)
     if real not in REALS:
         raise InputError("real", real, f"one of {', '.join(REALS)}")
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise InputError("name", name, "a C identifier of at most 31 characters")
-    if len(table.structure.inputs) != 1:
-        raise InputError("structure", table.structure.name, "one with a single input")
-    rig, factors = table.grid.rig, rig_gain_units(table)
-    if rig is not None and factors is None:
-        raise InputError("structure", table.structure.name, "torque fed back from θ and θ'")
-    scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
-    longest = max(point.delay for point in table.grid.points)
-    longest *= rig.time_scale if rig is not None else 1.0
-    depth = int(longest / step) + 3
-    if depth > 1_000_000:
-        raise InputError("period", step, f"at least {longest / 1e6:g}, for a delay of {longest:g}")
+    controller = sampled_controller(table, name, period, limit, ramp)
     header = Path(folder) / f"{name}.h"
     source = Path(folder) / f"{name}.c"
-    outputs = len(table.structure.outputs)
-    words = {
-        "name": name,
+    words = controller.words | {
         "NAME": name.upper(),
         "real": real,
-        "outputs": str(outputs),
-        "depth": str(depth),
-        "sign": SIGN.replace("theta''", "the torsional acceleration"),
-        "names": ", ".join(table.structure.outputs),
-        "units": "dimensionless" if rig is None else "rad, rad/s, s, N m",
-        "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
-        "checksum": to_document(table).header["checksum"],
-        "bounds": ", ".join(
-            f"{n} {low:g}..{high:g}"
-            for n, low, high in zip(
-                table.structure.entry_names,
-                table.structure.flat_lower,
-                table.structure.flat_upper,
-                strict=True,
-            )
-        ),
-        "period": _number(step, real),
-        "limit": _number(bound, real),
-        "ramp": str(count),
+        "period": _number(controller.period, real),
+        "limit": _number(controller.limit, real),
         "suffix": "F" if real == "float" else "",
-        "tables": _tables(table, scale, name, real),
+        "tables": _tables(controller, name, real),
     }
-    text = {header: _HEADER, source: _SOURCE}
-    for path, template in text.items():
-        write_text(path, re.sub(r"@(\w+)@", lambda match: words[match[1]], template))
+    for path, template in {header: _HEADER, source: _SOURCE}.items():
+        write_text(path, filled(template, words))
     return header, source
 
 
@@ -126,25 +86,17 @@ def _array(kind: str, name: str, values: list[str]) -> str:
     return f"static const {kind} {name}[{len(values)}] = {{\n    {body}\n}};\n"
 
 
-def _tables(table: GainTable, scale: FloatArray, name: str, real: str) -> str:
-    grid = table.grid
+def _tables(controller: SampledController, name: str, real: str) -> str:
     kind = f"{name}_real"
+    numbers = {f"axis{i}": ticks for i, ticks in enumerate(controller.axes)}
+    numbers["node_gains"] = controller.node_gains
+    # An array of no elements is not C.
+    numbers["cell_gains"] = controller.cell_gains or (0.0,)
     parts = [
-        _array(kind, f"axis{i}", [_number(v, real) for v in axis.values])
-        for i, axis in enumerate(grid.axes)
+        _array(kind, label, [_number(value, real) for value in values])
+        for label, values in numbers.items()
     ]
-    entries = (table.entries * scale).ravel().tolist()
-    parts.append(_array(kind, "node_gains", [_number(v, real) for v in entries]))
-    own = table.entries_of(table.cells.gains) * scale
-    listed = [row for row, mode in zip(own.tolist(), table.cells.mode.tolist(), strict=True)
-              if mode == 1]  # fmt: skip
-    index, modes = 0, []
-    for mode in table.cells.mode.tolist():
-        # Position of the constant gains plus 1, 0 for interpolation, -1 for not vouched for.
-        index += mode == 1
-        modes.append(str(index) if mode == 1 else "-1" if mode == UNSAFE else "0")
-    flat = [_number(v, real) for row in listed for v in row] or [_number(0.0, real)]
-    parts += [_array("int32_t", "cell_mode", modes), _array(kind, "cell_gains", flat)]
+    parts.append(_array("int32_t", "cell_mode", [str(mode) for mode in controller.cell_mode]))
     return "\n".join(parts)
 
 
@@ -154,6 +106,7 @@ _HEADER = """\
  * Law:        @sign@.
  * Outputs Y:  @names@, as perturbations from steady drilling
  * Units:      @units@
+ * Sampling:   @sampling@
  * Lookup:     @axes@, clamped at the ends of the table
  * Bounds:     @bounds@ (dimensionless)
  * Table:      SHA-256 @checksum@

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
-import numpy as np
-
-from drillctrl.errors import InputError, checked_integer, checked_number
 from drillctrl.files import write_text
-from drillctrl.tables.document import SIGN, rig_gain_units, to_document
-from drillctrl.tables.interpolation import UNSAFE
+from drillctrl.tables.sampled import SampledController, filled, sampled_controller
 from drillctrl.tables.table import GainTable
 
 
@@ -49,46 +44,21 @@ def export_st(
         If a value is out of range, the structure drives more than one input, or it has no
         gains in rig units over a grid in rig units.
     """
-    step = checked_number("period", period, 0.0, 1e6, open_low=True)
-    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    count = checked_integer("ramp", ramp, 0, 10**9)
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise InputError("name", name, "an identifier of at most 31 characters")
-    if len(table.structure.inputs) != 1:
-        raise InputError("structure", table.structure.name, "one with a single input")
-    rig, factors = table.grid.rig, rig_gain_units(table)
-    if rig is not None and factors is None:
-        raise InputError("structure", table.structure.name, "torque fed back from θ and θ'")
-    scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
-    longest = max(point.delay for point in table.grid.points)
-    longest *= rig.time_scale if rig is not None else 1.0
-    depth = int(longest / step) + 3
-    if depth > 1_000_000:
-        raise InputError("period", step, f"at least {longest / 1e6:g}, for a delay of {longest:g}")
-    outputs = len(table.structure.outputs)
-    words = {
-        "name": name,
-        "sign": SIGN.replace("theta''", "the torsional acceleration"),
-        "names": ", ".join(table.structure.outputs),
-        "units": "dimensionless" if rig is None else "rad, rad/s, s, N m",
-        "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
-        "checksum": to_document(table).header["checksum"],
-        "outputs": str(outputs),
+    controller = sampled_controller(table, name, period, limit, ramp)
+    outputs, depth = int(controller.words["outputs"]), int(controller.words["depth"])
+    words = controller.words | {
         "last": str(outputs - 1),
         "gains": str(2 * outputs),
         "lastgain": str(2 * outputs - 1),
-        "depth": str(depth),
         "lastpast": str(depth * outputs - 1),
-        "period": _number(step),
-        "limit": _number(bound),
-        "ramp": str(count),
-        "tables": _tables(table, scale),
+        "period": _number(controller.period),
+        "limit": _number(controller.limit),
+        "tables": _tables(controller),
     }
-    for i, axis in enumerate(table.grid.axes):
-        words[f"n{i}"] = str(len(axis.values))
-        words[f"c{i}"] = str(max(1, len(axis.values) - 1))
-    text = re.sub(r"@(\w+)@", lambda match: words[match[1]], _BLOCK)
-    write_text(path, text)
+    for i, ticks in enumerate(controller.axes):
+        words[f"n{i}"] = str(len(ticks))
+        words[f"c{i}"] = str(max(1, len(ticks) - 1))
+    write_text(path, filled(_BLOCK, words))
     return Path(path)
 
 
@@ -102,22 +72,16 @@ def _array(kind: str, name: str, values: list[str]) -> str:
     return f"    {name} : ARRAY[0..{len(values) - 1}] OF {kind} := [\n        {body}\n    ];"
 
 
-def _tables(table: GainTable, scale: np.ndarray) -> str:
+def _tables(controller: SampledController) -> str:
+    numbers = {f"Axis{i}": ticks for i, ticks in enumerate(controller.axes)}
+    numbers["NodeGains"] = controller.node_gains
+    # An array of no elements is not Structured Text.
+    numbers["CellGains"] = controller.cell_gains or (0.0,)
     parts = [
-        _array("LREAL", f"Axis{i}", [_number(v) for v in axis.values])
-        for i, axis in enumerate(table.grid.axes)
+        _array("LREAL", label, [_number(value) for value in values])
+        for label, values in numbers.items()
     ]
-    entries = (table.entries * scale).ravel().tolist()
-    parts.append(_array("LREAL", "NodeGains", [_number(v) for v in entries]))
-    own = table.entries_of(table.cells.gains) * scale
-    modes, flat = [], []
-    for row, mode in zip(own.tolist(), table.cells.mode.tolist(), strict=True):
-        if mode == 1:
-            flat += [_number(v) for v in row]
-        # Position of the constant gains plus 1, 0 for interpolation, -1 for not vouched for.
-        modes.append(str(len(flat) // len(row)) if mode == 1 else "-1" if mode == UNSAFE else "0")
-    parts.append(_array("DINT", "CellMode", modes))
-    parts.append(_array("LREAL", "CellGains", flat or [_number(0.0)]))
+    parts.append(_array("DINT", "CellMode", [str(mode) for mode in controller.cell_mode]))
     return "\n".join(parts)
 
 
@@ -126,6 +90,7 @@ _BLOCK = """\
    Law:     @sign@
    Outputs: Y = @names@, as perturbations from steady drilling
    Units:   @units@
+   Sampled: @sampling@
    Lookup:  Place = @axes@, clamped at the ends of the table
    Table:   SHA-256 @checksum@
    Call once a sampling period. While On is FALSE, U is 0 and samples are stored. *)

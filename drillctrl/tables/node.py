@@ -18,13 +18,16 @@ from drillctrl.optimisation.rounding import hold_multiple_root
 from drillctrl.optimisation.search import EFFORTS, Effort, global_search
 from drillctrl.spectrum.characteristic import FloatArray
 
-# Gains of neighbours lie in the basins that matter; nothing else is begun from.
+# Gains of neighbours lie in the basins that matter; nothing else is begun from. Only the
+# lowest end is sharpened: where that is the wrong one, the node stands out afterwards.
 _CONTINUED = {
     1: Effort(0, 0, 25, 1, 1),
     2: Effort(0, 0, 35, 2, 2),
-    3: Effort(0, 0, 60, 2, 2),
-    4: Effort(0, 0, 60, 2, 2),
+    3: Effort(0, 0, 60, 1, 2),
+    4: Effort(0, 0, 60, 1, 2),
 }
+# Share of its range by which a descent begins inside a bound: on it, it could never leave.
+_INSIDE = 0.05
 _KEPT = 4
 
 
@@ -86,11 +89,14 @@ def design_node(task: NodeTask) -> NodeDesign:
     if not isinstance(task.objective, Exact):
         return _design_otherwise(task)
     family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
-    count = min(task.structure.lower.size, 4)
-    effort = _CONTINUED.get(count) if task.known else EFFORTS.get(count)
+    lower, upper = task.structure.lower, task.structure.upper
+    margin = _INSIDE * (upper - lower)
+    known = [np.clip(gains, lower + margin, upper - margin) for gains in task.known]
+    count = min(lower.size, 4)
+    effort = _CONTINUED.get(count) if known else EFFORTS.get(count)
     # A sharpening step that overshoots far left overflows; what it finds is then refused.
     with np.errstate(over="ignore", invalid="ignore"):
-        search = global_search(family, task.seed, effort, task.known)
+        search = global_search(family, task.seed, effort, known)
     gains = hold_multiple_root(family, search.best)
     return NodeDesign(
         task.index,

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from drillctrl import InputError, cli, dimensionless_grid, linear_axis, table
+from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_table, table
 from drillctrl.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
@@ -91,6 +91,32 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
         found = table(GRID, "case1", executor=client.get_executor(pure=False), progress=kill_once)
     assert killed
     assert same(found, small)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits on the size of files")
+@pytest.mark.parametrize(("room", "refused"), [(200, "checkpoint = "), (1800, "--out = ")])
+def test_a_disk_without_room_is_one_line_and_leaves_the_old_file(room, refused, tmp_path):
+    import resource
+
+    out = tmp_path / "gains.json"
+    out.write_text("old")
+    program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9:11:2"]
+    program += ["--delta0", "1:2:2", "--out", str(out)]
+
+    # The system itself refuses to write files on, as on a full disk.
+    def little_room():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+    run = subprocess.run(program, capture_output=True, text=True, preexec_fn=little_room)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith(f"drillctrl: {refused}")
+    assert run.stderr.count("\n") == 1
+    assert out.read_text() == "old"
+    assert {path.name for path in tmp_path.iterdir()} == {"gains.json", "gains.json.checkpoint"}
+    # What was designed before is not lost.
+    subprocess.run(program, check=True, capture_output=True)
+    assert load_table(out).stable.all()
+    assert {path.name for path in tmp_path.iterdir()} == {"gains.json"}
 
 
 def test_a_scheduler_that_does_not_answer_is_refused(capsys):

@@ -1,0 +1,113 @@
+"""A table as a sampled controller: what its source says in every language."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.tables.document import SIGN, rig_gain_units, to_document
+from drillctrl.tables.interpolation import CONSTANT, UNSAFE
+from drillctrl.tables.table import GainTable
+
+# A ring of samples longer than this fits no drive.
+_DEEPEST = 1_000_000
+
+
+@dataclass(frozen=True)
+class SampledController:
+    """Numbers and words of a controller's source.
+
+    Attributes
+    ----------
+    period, limit : float
+        Sampling period and largest |u|, in the units of the table.
+    axes : tuple of tuple of float
+        Ticks of the three axes.
+    node_gains : tuple of float
+        Entries of K1, then K2, node by node, in the units of the table.
+    cell_mode : tuple of int
+        For each cell the position of its constant gains plus 1, 0 for interpolation, −1
+        where the table does not vouch.
+    cell_gains : tuple of float
+        Entries of K1, then K2, of the cells with constant gains.
+    words : dict of str to str
+        What stands for ``@word@`` in a template.
+    """
+
+    period: float
+    limit: float
+    axes: tuple[tuple[float, ...], ...]
+    node_gains: tuple[float, ...]
+    cell_mode: tuple[int, ...]
+    cell_gains: tuple[float, ...]
+    words: dict[str, str]
+
+
+def sampled_controller(
+    table: GainTable, name: str, period: float, limit: float, ramp: int
+) -> SampledController:
+    """Check what a controller is to be, and collect what its source says.
+
+    Parameters
+    ----------
+    table, name, period, limit, ramp
+        As for `export_c`.
+
+    Raises
+    ------
+    InputError
+        As `export_c` does.
+    """
+    step = checked_number("period", period, 0.0, 1e6, open_low=True)
+    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
+    count = checked_integer("ramp", ramp, 0, 10**9)
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+        raise InputError("name", name, "an identifier of at most 31 characters")
+    structure, rig, factors = table.structure, table.grid.rig, rig_gain_units(table)
+    if len(structure.inputs) != 1:
+        raise InputError("structure", structure.name, "one with a single input")
+    if rig is not None and factors is None:
+        raise InputError("structure", structure.name, "torque fed back from θ and θ'")
+    longest = max(point.delay for point in table.grid.points)
+    longest *= rig.time_scale if rig is not None else 1.0
+    depth = int(longest / step) + 3
+    if depth > _DEEPEST:
+        least = longest / _DEEPEST
+        raise InputError("period", step, f"at least {least:g}, for a delay of {longest:g}")
+    scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
+    mode = table.cells.mode
+    constant = mode == CONSTANT
+    listed = np.where(constant, np.cumsum(constant), np.where(mode == UNSAFE, -1, 0))
+    bounds = zip(structure.entry_names, structure.flat_lower, structure.flat_upper, strict=True)
+    words = {
+        "name": name,
+        "sign": SIGN.replace("theta''", "the torsional acceleration"),
+        "names": ", ".join(structure.outputs),
+        "units": "dimensionless" if rig is None else "rad, rad/s, s, N m",
+        "sampling": f"every {step:g}{'' if rig is None else ' s'}, "
+        f"magnitude of u at most {bound:g}{'' if rig is None else ' N m'}",
+        "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
+        "bounds": ", ".join(f"{entry} {low:g}..{high:g}" for entry, low, high in bounds),
+        "checksum": to_document(table).header["checksum"],
+        "outputs": str(len(structure.outputs)),
+        "depth": str(depth),
+        "ramp": str(count),
+    }
+    return SampledController(
+        step,
+        bound,
+        tuple(axis.values for axis in table.grid.axes),
+        tuple((table.entries * scale).ravel().tolist()),
+        tuple(listed.tolist()),
+        tuple((table.entries_of(table.cells.gains[constant]) * scale).ravel().tolist()),
+        words,
+    )
+
+
+def filled(template: str, words: Mapping[str, str]) -> str:
+    """Return a template with ``@word@`` replaced."""
+    return re.sub(r"@(\w+)@", lambda match: words[match[1]], template)
