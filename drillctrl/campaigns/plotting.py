@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.plotting import BLUE, GREEN, GREY, ORANGE
-from drillctrl.tables.plotting import AXIS_LABELS
+from drillctrl.tables.plotting import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +39,9 @@ def plot_campaign(campaign: Campaign) -> Figure:
     right, up = (axis for axis in range(3) if axis != across)
     middle = grid.shape[across] // 2
     chosen = np.take(np.arange(len(grid.points)).reshape(grid.shape), middle, axis=across)
-    x, y = (np.array(grid.axes[axis].values) for axis in (right, up))
+    x, y = (
+        np.array(grid.axes[axis].values) * grid.axes[axis].field_unit[1] for axis in (right, up)
+    )
     at_x, at_y = (values.ravel() for values in np.meshgrid(x, y, indexing="ij"))
     flat = chosen.ravel()
     measured = bool((np.nan_to_num(campaign.basin[flat, 0]) > 0.0).any())
@@ -74,8 +76,8 @@ def plot_campaign(campaign: Campaign) -> Figure:
     for ax in axes:
         if min(alpha.shape) > 1 and alpha.min() < 0.0 < alpha.max():
             ax.contour(x, y, alpha.T, levels=[0.0], colors="black", linewidths=1.0)
-        ax.set_xlabel(AXIS_LABELS[grid.axes[right].name])
-        ax.set_ylabel(AXIS_LABELS[grid.axes[up].name])
+        ax.set_xlabel(axis_label(grid.axes[right]))
+        ax.set_ylabel(axis_label(grid.axes[up]))
     kick = ", ".join(f"{name} = {value:g}" for name, value in campaign.disturbance.items())
     figure.suptitle(f"After {kick} times the size; the line is α = 0", fontsize="medium")
     return figure

@@ -30,6 +30,13 @@ AXIS_UNITS = {
     "weight_on_bit": "N",
     "rock_strength": "Pa",
 }
+# What people read: a unit of the field, and how many of it are one SI unit.
+FIELD_UNITS = {
+    "rotary_speed": ("rpm", 30.0 / math.pi),
+    "penetration_rate": ("m/h", 3600.0),
+    "weight_on_bit": ("kN", 1e-3),
+    "rock_strength": ("MPa", 1e-6),
+}
 DIMENSIONLESS = ("omega0", "delta0", "psi")
 RATE = ("rotary_speed", "penetration_rate", "rock_strength")
 WEIGHT = ("rotary_speed", "weight_on_bit", "rock_strength")
@@ -67,6 +74,17 @@ class Axis:
     def unit(self) -> str:
         """SI unit, ``"1"`` for a plain number."""
         return AXIS_UNITS[self.name]
+
+    @property
+    def field_unit(self) -> tuple[str, float]:
+        """Unit that a driller reads, empty for a plain number, and how many are one SI unit."""
+        return FIELD_UNITS.get(self.name, ("", 1.0))
+
+    def text(self, *values: float) -> str:
+        """Return a value, or the ends of a range, with name and unit for people."""
+        unit, factor = self.field_unit
+        numbers = " … ".join(f"{factor * value:.4g}" for value in dict.fromkeys(values))
+        return f"{self.name.replace('_', ' ')} {numbers} {unit}".strip()
 
 
 def linear_axis(name: str, low: float, high: float, count: int) -> Axis:

@@ -8,21 +8,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.tables.grid import Axis
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, cell_shape
 from drillctrl.tables.table import GainTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AXIS_LABELS = {
+_NAMES = {
     "omega0": "rotary speed ω0",
     "delta0": "depth of cut δ0",
     "psi": "cutting coefficient ψ",
-    "rotary_speed": "rotary speed (rad/s)",
-    "penetration_rate": "penetration rate (m/s)",
-    "weight_on_bit": "weight on bit (N)",
-    "rock_strength": "rock strength (Pa)",
 }
+
+
+def axis_label(axis: Axis) -> str:
+    """Return name and unit of an axis for a figure."""
+    unit, _ = axis.field_unit
+    name = _NAMES.get(axis.name, axis.name.replace("_", " "))
+    return f"{name} ({unit})" if unit else name
 
 
 def plot_table(table: GainTable) -> Figure:
@@ -52,7 +56,7 @@ def plot_table(table: GainTable) -> Figure:
     figure = Figure(figsize=(4.0 * columns, 3.3 * rows + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    x, y = np.array(grid.axes[down].values), np.array(grid.axes[up].values)
+    x, y = (np.array(axis.values) * axis.field_unit[1] for axis in (grid.axes[down], grid.axes[up]))
     stable = layer(table.stable)
     at_x, at_y = np.meshgrid(x, y, indexing="ij")
     slot = min(middle, cell_shape(grid)[across] - 1)
@@ -76,12 +80,15 @@ def plot_table(table: GainTable) -> Figure:
                         Rectangle((x[i], y[j]), *size, fill=False, hatch=hatch, linewidth=0.0)
                     )
         ax.set_title(name)
-        ax.set_xlabel(AXIS_LABELS[grid.axes[down].name])
-        ax.set_ylabel(AXIS_LABELS[grid.axes[up].name])
+        ax.set_xlabel(axis_label(grid.axes[down]))
+        ax.set_ylabel(axis_label(grid.axes[up]))
     for ax in axes[len(fields) :]:
         ax.set_axis_off()
     third = grid.axes[across]
+    held = third.values[middle] * third.field_unit[1]
     note = "× not stable, //// not vouched for, · constant gains"
-    where = f"{AXIS_LABELS[third.name]} = {third.values[middle]:.4g}"
-    figure.suptitle(f"{table.structure.name} at {where};  {note}", fontsize="medium")
+    figure.suptitle(
+        f"{table.structure.name} at {axis_label(third)} = {held:.4g};  {note}",
+        fontsize="medium",
+    )
     return figure

@@ -171,9 +171,8 @@ class GainTable:
         """Return a text for people."""
         jump, between = self.jump
         axes = [
-            f"{axis.name} {axis.values[0]:g} … {axis.values[-1]:g}"
-            + (f" {axis.unit}" if axis.unit != "1" else "")
-            + f" ({len(axis.values)})"
+            axis.text(axis.values[0], axis.values[-1])
+            + (f" ({len(axis.values)})" if len(axis.values) > 1 else "")
             for axis in self.grid.axes
         ]
         lost = "lowest α at each node"
@@ -196,10 +195,14 @@ class GainTable:
             alpha = self.spectral_abscissa[self.stable]
             lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} where stable")
         if between is not None:
-            ends = [np.array2string(self.grid.coordinates[i], precision=4) for i in between]
+            ends = self.grid.coordinates[list(between)].T.tolist()
+            where = [
+                axis.text(*pair)
+                for axis, pair in zip(self.grid.axes, ends, strict=True)
+                if len(axis.values) > 1
+            ]
             lines.append(
-                f"  Largest jump  {100 * jump:.1f} % of a gain's range, between {ends[0]} and "
-                f"{ends[1]}"
+                f"  Largest jump  {100 * jump:.1f} % of a gain's range, {', '.join(where)}"
             )
         counts = [
             f"{int((self.cells.mode == mode).sum())} {name}" for mode, name in enumerate(CELL_NAMES)

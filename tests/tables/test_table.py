@@ -138,6 +138,17 @@ def test_figure_shows_gains_and_abscissa(on_rig):
     assert drawn == pytest.approx(np.sort(on_rig.spectral_abscissa).tolist())
 
 
+def test_people_read_the_units_of_the_field(on_rig):
+    assert "rotary speed 100 … 220 rpm (3), penetration rate 20 … 60 m/h (2)" in on_rig.summary()
+    assert "rock strength 60 MPa\n" in on_rig.summary()
+    ax = on_rig.plot().axes[0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("rotary speed (rpm)", "penetration rate (m/h)")
+    low, high = ax.get_xlim()
+    assert low < 100.0 < 220.0 < high < 300.0
+    # Files and the interface for programs stay in SI units.
+    assert on_rig.to_dict()["axes"]["rotary_speed"][-1] == pytest.approx(220 * math.pi / 30)
+
+
 def test_another_objective_is_designed_for_at_each_node():
     grid = dimensionless_grid(linear_axis("omega0", 9, 11, 2), 2.0, 14.0)
     worst = WorstCase(psi=0.2)
