@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,6 +31,8 @@ _STEPS = (0.25, 0.125, 0.0625, 0.03)
 # Share of the range of α over a cell that the worst point may have been missed by.
 _MISSED = 0.1
 _DESCENT = 60
+# Cells of one task.
+_TOGETHER = 64
 
 
 class Place(NamedTuple):
@@ -115,17 +119,11 @@ def interpolated(where: Place, gains: FloatArray, cells: Cells | None) -> FloatA
     return np.asarray(vectors)
 
 
-def check_cells(
-    grid: Grid, structure: FeedbackStructure, gains: FloatArray, stable: BoolArray
-) -> Cells:
-    """Check the interpolated gains in every cell, and mend those that fail.
+@dataclass(frozen=True, eq=False)
+class CellTask:
+    """Some cells to check, as plain data.
 
-    α is computed at the centre, the middles of the edges and faces, and the corners; from the
-    worst of these a pattern search looks for a worse point. A cell passes if what it finds is
-    negative by a tenth of the range of α in the cell. One that fails with stable corners is
-    given the constant gains that are best at its worst of these points, if they pass.
-
-    Parameters
+    Attributes
     ----------
     grid, structure : Grid, FeedbackStructure
         Of the table.
@@ -133,24 +131,72 @@ def check_cells(
         Gain vectors at the nodes.
     stable : bool array, (q,)
         Nodes that are stable.
+    cells : int array, (c,)
+        Which ones.
     """
-    count = math.prod(cell_shape(grid))
-    origin = np.column_stack(np.unravel_index(np.arange(count), cell_shape(grid)))
-    every = np.arange(count)
-    worst, spread = _worst(grid, structure, gains, None, every, origin)
+
+    grid: Grid
+    structure: FeedbackStructure
+    gains: FloatArray
+    stable: BoolArray
+    cells: IntArray
+
+
+def cell_tasks(
+    grid: Grid, structure: FeedbackStructure, gains: FloatArray, stable: BoolArray
+) -> list[CellTask]:
+    """Return tasks that together check every cell."""
+    every = np.arange(math.prod(cell_shape(grid)))
+    # A copy leaves behind what the grid has worked out and a task need not carry.
+    bare = dataclasses.replace(grid)
+    return [
+        CellTask(bare, structure, gains, stable, every[i : i + _TOGETHER])
+        for i in range(0, every.size, _TOGETHER)
+    ]
+
+
+def joined(parts: Iterable[tuple[IntArray, Cells]]) -> Cells:
+    """Return the cells of all tasks, whatever order they come in."""
+    ordered = [cells for _, cells in sorted(parts, key=lambda part: int(part[0][0]))]
+    return Cells(
+        np.concatenate([cells.mode for cells in ordered]),
+        np.concatenate([cells.spectral_abscissa for cells in ordered]),
+        np.concatenate([cells.gains for cells in ordered]),
+    )
+
+
+def check_cells(task: CellTask) -> tuple[IntArray, Cells]:
+    """Check the interpolated gains in some cells, and mend those that fail.
+
+    α is computed at the centre, the middles of the edges and faces, and the corners; from the
+    worst of these a pattern search looks for a worse point. A cell passes if what it finds is
+    negative by a tenth of the range of α in the cell. One that fails with stable corners is
+    given the constant gains that are best at its worst of these points, if they pass.
+
+    Returns
+    -------
+    cells : int array, (c,)
+        Those of the task.
+    found : Cells
+        What is known of them.
+    """
+    grid, structure, gains = task.grid, task.structure, task.gains
+    total, count = math.prod(cell_shape(grid)), task.cells.size
+    origin = np.column_stack(np.unravel_index(task.cells, cell_shape(grid)))
+    worst, spread = _worst(grid, structure, gains, None, task.cells, origin)
     corners = place(grid, _to_coordinates(grid, origin, np.full((count, 3), 0.5))).corners
-    sound = stable[corners].all(axis=1)
+    sound = task.stable[corners].all(axis=1)
     passed = sound & (worst + _MISSED * spread < 0.0)
     mode = np.where(passed, INTERPOLATED, UNSAFE)
     constant = np.zeros((count, gains.shape[1]))
-    for cell in np.flatnonzero(sound & ~passed).tolist():
-        here = np.array([cell])
-        candidate = _constant_gains(grid, structure, gains[np.unique(corners[cell])], origin[cell])
-        trial = Cells(np.full(count, CONSTANT), worst, np.tile(candidate, (count, 1)))
-        value, width = _worst(grid, structure, gains, trial, here, origin[here])
+    for i in np.flatnonzero(sound & ~passed).tolist():
+        candidate = _constant_gains(grid, structure, gains[np.unique(corners[i])], origin[i])
+        trial = Cells(np.full(total, CONSTANT), np.zeros(total), np.tile(candidate, (total, 1)))
+        here = np.array([i])
+        value, width = _worst(grid, structure, gains, trial, task.cells[here], origin[here])
         if value[0] + _MISSED * width[0] < 0.0:
-            mode[cell], worst[cell], constant[cell] = CONSTANT, value[0], candidate
-    return Cells(mode, worst, constant)
+            mode[i], worst[i], constant[i] = CONSTANT, value[0], candidate
+    return task.cells, Cells(mode, worst, constant)
 
 
 def _to_coordinates(grid: Grid, origin: IntArray, local: FloatArray) -> FloatArray:
@@ -185,7 +231,8 @@ def _abscissas(
         vectors[own] = cells.gains[index[own]]
     groups = grid.groups(coordinates)
     parameters = dict(zip(("omega0", "delta0", "psi"), groups.T, strict=True))
-    return spectral_abscissas(grid.points[0], parameters, structure, vectors)
+    first = grid.point(*(axis.values[0] for axis in grid.axes))
+    return spectral_abscissas(first, parameters, structure, vectors)
 
 
 def _worst(

@@ -24,8 +24,10 @@ from drillctrl.tables.interpolation import (
     UNSAFE,
     BoolArray,
     Cells,
+    cell_tasks,
     check_cells,
     interpolated,
+    joined,
     place,
 )
 from drillctrl.tables.node import NodeDesign, NodeTask, check_node
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FALLBACKS = ("off", "best")
+Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
@@ -260,7 +263,7 @@ def table(
     checkpoint : Checkpoint, optional
         Finished designs are kept there, and those that it knows are not done again.
     progress : callable, optional
-        Called with the name of a stage, nodes done and nodes to do.
+        Called with the name of a stage, tasks done and tasks to do.
 
     Raises
     ------
@@ -276,9 +279,7 @@ def table(
     if fallback not in FALLBACKS:
         raise InputError("fallback", fallback, f"one of {', '.join(FALLBACKS)}")
 
-    def run(
-        stage: str, work: Callable[[NodeTask], Result], tasks: Sequence[NodeTask]
-    ) -> Iterable[Result]:
+    def run(stage: str, work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterable[Result]:
         for done, result in enumerate(spread_out(executor, work, tasks), 1):
             if progress is not None:
                 progress(stage, done, len(tasks))
@@ -309,8 +310,7 @@ def table(
     tasks = [NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)]
     checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
     stable = np.array([check.stable for check in checks])
-    with threadpool_limits(1, user_api="blas"):
-        cells = check_cells(grid, chosen, gains, stable)
+    cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, stable)))
     return GainTable(
         grid,
         chosen,
