@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from drillctrl.optimisation.active import hypotheses, sharpen
+from drillctrl.optimisation.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.optimisation.descent import bfgs
 from drillctrl.optimisation.explicit import explicit_candidates
 from drillctrl.optimisation.family import ActiveRoot, LoopFamily
@@ -216,9 +216,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
                 sharp = sharpen(family, best.gains, best.value, roots)
                 value = spectral_abscissa(family.loop(sharp.gains))
                 used += sharp.evaluations + 1
-                # The conditions hold to rounding, of which the abscissa shows the k-th root.
-                blur = 1e-9 ** (1.0 / max(root.multiplicity for root in roots))
-                converged = sharp.residual < 1e-9 and value < sharp.abscissa + blur
+                converged = sharp.residual < 1e-9 and value < sharp.abscissa + _blur(roots)
                 if converged and sharp.abscissa < best.value - 1e-12:
                     best = Basin(sharp.gains, sharp.abscissa, sharp.roots)
                     improved = True
@@ -228,6 +226,39 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
         if not improved:
             break
     return best, used
+
+
+def follow(family: LoopFamily, start: FloatArray, roots: tuple[ActiveRoot, ...]) -> Basin | None:
+    """Return the optimum near some gains with given active roots, if there is one.
+
+    Parameters
+    ----------
+    family : LoopFamily
+        Loops to choose from.
+    start : array, (k,)
+        Gains that are nearly optimal, such as those of a loop nearby.
+    roots : tuple of ActiveRoot
+        The roots that were active there.
+    """
+    lower, upper = family.feedback.lower, family.feedback.upper
+    start = np.clip(start, lower, upper)
+    sharp = sharpen(family, start, spectral_abscissa(family.loop(start)), roots)
+    if not _holds(family, sharp):
+        return None
+    return Basin(sharp.gains, sharp.abscissa, sharp.roots)
+
+
+def _holds(family: LoopFamily, sharp: ActiveDesign) -> bool:
+    """Whether the conditions are met and no other root lies further right."""
+    if not sharp.residual < 1e-9:
+        return False
+    value = spectral_abscissa(family.loop(sharp.gains))
+    return value < sharp.abscissa + _blur(sharp.roots)
+
+
+def _blur(roots: tuple[ActiveRoot, ...]) -> float:
+    """What the abscissa shows of conditions that hold to rounding: its k-th root."""
+    return float(1e-9 ** (1.0 / max(root.multiplicity for root in roots)))
 
 
 def _distinct(basins: list[Basin]) -> tuple[Basin, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.feedback import FeedbackStructure
+from drillctrl.optimisation.family import ActiveRoot
 from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
@@ -17,6 +18,8 @@ from drillctrl.tables.grid import Grid
 from drillctrl.tables.node import NodeDesign, NodeTask, design_node
 
 Mapper = Callable[[Callable[[NodeTask], NodeDesign], Sequence[NodeTask]], Iterable[NodeDesign]]
+
+Active = tuple[tuple[ActiveRoot, ...], ...]
 
 _ROUNDS = 4
 _MOST_KNOWN = 4
@@ -69,19 +72,17 @@ def design_grid(
     stride = _coarse_stride(grid.shape)
     apart = _ONE_BASIN * (structure.upper - structure.lower)
     # The same task again would end the same.
-    tried: set[tuple[int, bytes]] = set()
+    tried: set[tuple[int, bytes, Active]] = set()
     while stride >= 1:
         chosen = [
             index
             for index, place in enumerate(np.ndindex(grid.shape))
             if index not in found and _on_level(place, grid.shape, stride)
         ]
-        tasks = [
-            NodeTask(
-                i, grid.points[i], structure, seed, _nearby(grid.shape, i, stride, found, apart)
-            )
-            for i in chosen
-        ]
+        tasks = []
+        for i in chosen:
+            known, active = _nearby(grid.shape, i, stride, found, apart)
+            tasks.append(NodeTask(i, grid.points[i], structure, seed, known, active=active))
         tried.update(map(_key, tasks))
         found.update({design.index: design for design in run(design_node, tasks)})
         stride //= 2
@@ -100,8 +101,8 @@ def design_grid(
     return [found[index] for index in range(len(grid.points))]
 
 
-def _key(task: NodeTask) -> tuple[int, bytes]:
-    return task.index, np.array(task.known).tobytes()
+def _key(task: NodeTask) -> tuple[int, bytes, Active]:
+    return task.index, np.array(task.known).tobytes(), task.active
 
 
 def neighbours(shape: tuple[int, ...], index: int, reach: int = 1) -> list[int]:
@@ -146,12 +147,12 @@ def _nearby(
     stride: int,
     found: dict[int, NodeDesign],
     apart: FloatArray,
-) -> tuple[FloatArray, ...]:
-    """Return the gains around a node, one vector a basin."""
+) -> tuple[tuple[FloatArray, ...], Active]:
+    """Return the gains around a node and the active roots there, one vector a basin."""
     if not found:
-        return ()
+        return (), ()
     place = np.unravel_index(index, shape)
-    basins: list[list[FloatArray]] = []
+    basins: list[list[NodeDesign]] = []
     for step in itertools.product((-stride, 0, stride), repeat=len(shape)):
         other = [int(i) + s for i, s in zip(place, step, strict=True)]
         if any(not 0 <= i < size for i, size in zip(other, shape, strict=True)):
@@ -159,16 +160,18 @@ def _nearby(
         design = found.get(int(np.ravel_multi_index(other, shape)))
         if design is None:
             continue
-        home = next((b for b in basins if (np.abs(b[0] - design.gains) < apart).all()), None)
+        home = next((b for b in basins if (np.abs(b[0].gains - design.gains) < apart).all()), None)
         if home is None:
-            basins.append([design.gains])
+            basins.append([design])
         else:
-            home.append(design.gains)
+            home.append(design)
     if not basins:
         nearest = min(found, key=lambda i: _distance(shape, i, index))
-        return (found[nearest].gains,)
+        basins = [[found[nearest]]]
+    basins = basins[:_MOST_KNOWN]
     # Neighbours stand on opposite sides: their mean is closer than any of them.
-    return tuple(np.mean(basin, axis=0) for basin in basins[:_MOST_KNOWN])
+    means = tuple(np.mean([design.gains for design in basin], axis=0) for basin in basins)
+    return means, tuple(basin[0].roots for basin in basins)
 
 
 def _distance(shape: tuple[int, ...], first: int, second: int) -> int:
@@ -202,8 +205,10 @@ def _restarts(
     promise |= apart & (there < here - 0.02 * np.abs(here))
     tasks = []
     for index in np.unique(pairs[promise, 0]).tolist():
-        known = tuple(gains[j] for j in pairs[promise & (pairs[:, 0] == index), 1])
-        tasks.append(NodeTask(index, grid.points[index], structure, seed, known[:_MOST_KNOWN]))
+        better = pairs[promise & (pairs[:, 0] == index), 1][:_MOST_KNOWN].tolist()
+        known = tuple(gains[j] for j in better)
+        active = tuple(found[j].roots for j in better)
+        tasks.append(NodeTask(index, grid.points[index], structure, seed, known, active=active))
     return tasks
 
 

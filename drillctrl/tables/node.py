@@ -12,10 +12,10 @@ from drillctrl.designing import design
 from drillctrl.feedback import FeedbackStructure
 from drillctrl.operating_point import OperatingPoint
 from drillctrl.optimisation.certificate import certify_optimality
-from drillctrl.optimisation.family import loop_family
+from drillctrl.optimisation.family import ActiveRoot, LoopFamily, loop_family
 from drillctrl.optimisation.objectives import EXACT, Exact, Objective
 from drillctrl.optimisation.rounding import hold_multiple_root
-from drillctrl.optimisation.search import EFFORTS, Effort, global_search
+from drillctrl.optimisation.search import EFFORTS, Effort, Search, follow, global_search
 from drillctrl.spectrum.characteristic import FloatArray
 
 # Gains of neighbours lie in the basins that matter; nothing else is begun from. Only the
@@ -29,6 +29,8 @@ _CONTINUED = {
 # Share of its range by which a descent begins inside a bound: on it, it could never leave.
 _INSIDE = 0.05
 _KEPT = 4
+# Residual of the first-order conditions up to which an optimum counts as followed.
+_STATIONARY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,8 @@ class NodeTask:
         Of the starting points.
     known : tuple of array, (k,)
         Gains of neighbours; without any the whole box is searched.
+    active : tuple of tuple of ActiveRoot
+        The active roots there, as many as ``known`` or none; each may be empty.
     objective : Objective
         What is minimised; only the exact abscissa begins at ``known``.
     """
@@ -57,6 +61,7 @@ class NodeTask:
     seed: int
     known: tuple[FloatArray, ...] = ()
     objective: Objective = EXACT
+    active: tuple[tuple[ActiveRoot, ...], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +80,8 @@ class NodeDesign:
         Residual of the first-order conditions; see `OptimalityCertificate`.
     basins : tuple of array, (k,)
         Ends of the other descents, best first.
+    roots : tuple of ActiveRoot
+        The active ones, where the gains were sharpened on them.
     """
 
     index: int
@@ -82,21 +89,21 @@ class NodeDesign:
     spectral_abscissa: float
     stationarity: float
     basins: tuple[FloatArray, ...]
+    roots: tuple[ActiveRoot, ...] = ()
 
 
 def design_node(task: NodeTask) -> NodeDesign:
-    """Search for the best gains at a node, from its neighbours' if there are any."""
+    """Find the best gains at a node, from its neighbours' if there are any.
+
+    Where the neighbours' active roots stay active, their optimum is followed; elsewhere
+    descents begin at their gains, or all over the box.
+    """
     if not isinstance(task.objective, Exact):
         return _design_otherwise(task)
     family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
-    lower, upper = task.structure.lower, task.structure.upper
-    margin = _INSIDE * (upper - lower)
-    known = [np.clip(gains, lower + margin, upper - margin) for gains in task.known]
-    count = min(lower.size, 4)
-    effort = _CONTINUED.get(count) if known else EFFORTS.get(count)
     # A sharpening step that overshoots far left overflows; what it finds is then refused.
     with np.errstate(over="ignore", invalid="ignore"):
-        search = global_search(family, task.seed, effort, known)
+        search = _followed(family, task) or _searched(family, task)
     gains = hold_multiple_root(family, search.best)
     return NodeDesign(
         task.index,
@@ -104,7 +111,35 @@ def design_node(task: NodeTask) -> NodeDesign:
         analyze_loop(family.loop(gains)).spectral_abscissa,
         certify_optimality(family, gains, search).stationarity,
         tuple(basin.gains for basin in search.basins[1:_KEPT]),
+        search.best.roots,
     )
+
+
+def _followed(family: LoopFamily, task: NodeTask) -> Search | None:
+    """Follow the optimum of every neighbour, or None where one of them ends."""
+    basins = []
+    for gains, roots in zip(task.known, task.active, strict=False):
+        basin = follow(family, gains, roots) if roots else None
+        if basin is None:
+            return None
+        alone = Search(basin, (basin,), 1, 1)
+        if not certify_optimality(family, basin.gains, alone).stationarity < _STATIONARY:
+            return None
+        basins.append(basin)
+    if not basins:
+        return None
+    basins.sort(key=lambda basin: basin.value)
+    return Search(basins[0], tuple(basins), 1, len(basins))
+
+
+def _searched(family: LoopFamily, task: NodeTask) -> Search:
+    """Descend from the neighbours' gains, or from all over the box."""
+    lower, upper = task.structure.lower, task.structure.upper
+    margin = _INSIDE * (upper - lower)
+    known = [np.clip(gains, lower + margin, upper - margin) for gains in task.known]
+    count = min(lower.size, 4)
+    effort = _CONTINUED.get(count) if known else EFFORTS.get(count)
+    return global_search(family, task.seed, effort, known)
 
 
 def _design_otherwise(task: NodeTask) -> NodeDesign:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.checkpoint import Checkpoint
+from drillctrl.optimisation.family import ActiveRoot
 from drillctrl.tables.node import NodeDesign, NodeTask
 
 
@@ -23,6 +24,7 @@ def find_design(checkpoint: Checkpoint, task: NodeTask) -> NodeDesign | None:
         float.fromhex(entry["spectral_abscissa"]),
         float.fromhex(entry["stationarity"]),
         tuple(_array(basin) for basin in entry["basins"]),
+        tuple(ActiveRoot(float.fromhex(omega), count) for omega, count in entry["roots"]),
     )
 
 
@@ -39,6 +41,7 @@ def keep_design(checkpoint: Checkpoint, task: NodeTask, design: NodeDesign) -> N
         "spectral_abscissa": float(design.spectral_abscissa).hex(),
         "stationarity": float(design.stationarity).hex(),
         "basins": [_text(basin) for basin in design.basins],
+        "roots": [[root.omega.hex(), root.multiplicity] for root in design.roots],
     }
     checkpoint.keep(task_key(task), entry)
 
@@ -56,7 +59,9 @@ def task_key(task: NodeTask) -> str:
     ties = [dataclasses.astuple(tie) for tie in task.structure.ties]
     known = [gains.tolist() for gains in task.known]
     point = dataclasses.astuple(task.point)
-    text = repr((task.index, point, structure, ties, task.seed, known, task.objective))
+    active = [[dataclasses.astuple(root) for root in roots] for roots in task.active]
+    rest = task.seed, known, active, task.objective
+    text = repr((task.index, point, structure, ties, *rest))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
