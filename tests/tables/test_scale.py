@@ -94,7 +94,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limits on the size of files")
-@pytest.mark.parametrize(("room", "refused"), [(200, "checkpoint = "), (1800, "--out = ")])
+@pytest.mark.parametrize(("room", "refused"), [(200, "checkpoint = "), (2000, "--out = ")])
 def test_a_disk_without_room_is_one_line_and_leaves_the_old_file(room, refused, tmp_path):
     import resource
 
