@@ -108,11 +108,14 @@ def polish(system: DelaySystem, start: ComplexArray) -> _Polished:
     done = np.zeros(s.shape, dtype=bool)
     last = np.full(s.shape, np.inf)
     for _ in range(24):
-        newton = 1.0 / characteristic.log_derivative(system, s)
+        # What runs away is no number in the end, and does not converge.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = 1.0 / characteristic.log_derivative(system, s)
         everyone = np.concatenate([s, s[s.imag > 0].conj()]) if s.imag.any() else s
         gap = s[:, None] - everyone
         gap[gap == 0] = np.inf
-        step = newton / (1.0 - newton * (1.0 / gap).sum(axis=1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = newton / (1.0 - newton * (1.0 / gap).sum(axis=1))
         step.imag[s.imag == 0] = 0.0
         step[done] = 0.0
         size, scale = np.abs(step), 1.0 + np.abs(s)
