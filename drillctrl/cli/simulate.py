@@ -86,8 +86,7 @@ def simulate_command(
       drillctrl simulate --omega0 10 --delta0 2.5 --psi 14 --duration 200 --plot motion.png
       drillctrl simulate --delta0 2.5 --structure case1 --K1 -3.82 --K2 3.61 --out motion.csv
       drillctrl simulate --delta0 2.5 --floquet --plot portrait.png --figure phase
-      drillctrl simulate --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case1
-        --K1 -3.82 --K2 3.61 --period "10 ms" --limit "3 kN*m" --duration "30 s"
+      drillctrl simulate --rig table1 --speed "150 rpm" --rop "20 m/h" --duration "30 s"
     """
     check_folder("--out", out)
     check_figure(plot)
