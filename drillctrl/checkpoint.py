@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from drillctrl.errors import InputError
 class Checkpoint:
     """An append-only file of finished results.
 
-    Each line names its task by a key, a hash of everything that the result depends on, so
+    The first line names the version that wrote it, for another may find other results. Each
+    further line names its task by a key, a hash of everything that the result depends on, so
     lines of another task are never taken for this one's. A line that was cut short is dropped.
 
     Parameters
@@ -23,16 +25,29 @@ class Checkpoint:
     Raises
     ------
     InputError
-        If the file cannot be read or written.
+        If the file cannot be read or written, or is none of this version's checkpoints: it is
+        left as it is.
     """
 
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self._known: dict[str, dict[str, Any]] = {}
+        own = version("drillctrl")
+        header = json.dumps({"drillctrl checkpoint": own}).encode("ascii") + b"\n"
         try:
             self._file = self._path.open("a+b")
             self._file.seek(0)
-            kept = 0
+            first = self._file.readline()
+            # A kill may have cut the first line short.
+            if not header.startswith(first):
+                self._file.close()
+                raise InputError("checkpoint", str(path), f"a checkpoint of drillctrl {own}")
+            if first != header:
+                self._file.truncate(0)
+                self._file.write(header)
+                self._file.flush()
+                return
+            kept = len(first)
             for line in self._file:
                 entry = _read_line(line)
                 if entry is None:

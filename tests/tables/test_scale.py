@@ -33,6 +33,7 @@ def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
     again = table(GRID, "case1", checkpoint=second, progress=lambda *a: seen.append(a))
     second.close()
     assert same(again, small)
+    # The first line is the header.
     assert sum(stage == "design" for stage, _, _ in seen) == len(lines) - 4
     assert path.read_bytes().count(b"\n") == len(lines)
     # Another seed is another task.
@@ -46,11 +47,26 @@ def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
 
 def test_rubbish_in_a_checkpoint_is_dropped(tmp_path):
     path = tmp_path / "bad.checkpoint"
-    path.write_bytes(b'{"task": 1}\nnot json\n')
     Checkpoint(path).close()
-    assert path.read_bytes() == b""
+    header = path.read_bytes()
+    path.write_bytes(header + b'{"task": 1}\nnot json\n')
+    Checkpoint(path).close()
+    assert path.read_bytes() == header
+    # A kill in the first line leaves nothing to know.
+    path.write_bytes(header[:9])
+    Checkpoint(path).close()
+    assert path.read_bytes() == header
     with pytest.raises(InputError, match="checkpoint"):
         Checkpoint(tmp_path / "no" / "folder")
+
+
+@pytest.mark.parametrize("content", [b"K1,K2\n-3.8,3.6\n", b'{"drillctrl checkpoint": "0.0"}\n'])
+def test_a_file_that_is_no_checkpoint_is_refused_and_left_alone(content, tmp_path):
+    path = tmp_path / "gains.csv"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="a checkpoint of drillctrl"):
+        Checkpoint(path)
+    assert path.read_bytes() == content
 
 
 def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(tmp_path):
