@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from importlib.metadata import version
 from pathlib import Path
@@ -85,6 +86,7 @@ class Checkpoint:
             line = json.dumps({"task": key, "result": result})
             self._file.write(line.encode("ascii") + b"\n")
             self._file.flush()
+            self._known[key] = result
         except OSError as error:
             raise self._refused(error) from None
 
@@ -94,8 +96,14 @@ class Checkpoint:
         self._path.unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Close the file and leave it for the next run."""
-        self._file.close()
+        """Close the file and leave it for the next run, unless there is nothing in it."""
+        if self._file.closed:
+            return
+        # What could not be written has been told; closing would tell it again.
+        with contextlib.suppress(OSError):
+            self._file.close()
+        if not self._known:
+            self._path.unlink(missing_ok=True)
 
 
 def _read_line(line: bytes) -> dict[str, Any] | None:

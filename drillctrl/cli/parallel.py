@@ -39,6 +39,10 @@ def _cluster(address: str) -> Iterator[Executor]:
             "--scheduler", address, "used with Dask: pip install 'drillctrl[cluster]'"
         ) from None
     try:
+        from distributed.comm.addressing import get_address_host_port
+
+        # A client given what is no address tries to close what it has not opened.
+        get_address_host_port(address)
         make: Any = distributed.Client
         client = make(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,8 +114,11 @@ def table_command(
     if out is not None and not controller:
         check_table_path(out)
     _check_controller(out, period, limit, controller)
-    checkpoint = None if out is None else Checkpoint(f"{out}.checkpoint")
-    with open_executor(workers, scheduler) as executor, open_progress() as progress:
+    with (
+        open_executor(workers, scheduler) as executor,
+        nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,
+        open_progress() as progress,
+    ):
         result = table(
             nodes,
             structure,

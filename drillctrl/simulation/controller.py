@@ -100,7 +100,7 @@ class Controller:
             raise InputError("noise", dict(self.noise), "left out unless there is a period")
         for name, deviation in self.noise.items():
             if name not in STATE_NAMES:
-                raise InputError("noise", name, f"of one of {', '.join(STATE_NAMES)}")
+                raise InputError("noise", name, f"of {', '.join(STATE_NAMES)}")
             checked_number(f"noise {name}", deviation, 0.0, 1e9)
         self.gains()
 
