@@ -68,6 +68,7 @@ class Trial:
         parts: list[Any] = [getattr(self, f.name) for f in fields(self) if f.name != "controller"]
         if self.controller is not None:
             parts += [array.tolist() for array in self.controller.gains()]
+            parts.append(self.controller.delays(0.0).tolist())
             own = ("feedback", "K1", "K2", "schedule")
             parts += [
                 getattr(self.controller, f.name)

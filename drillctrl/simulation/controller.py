@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,26 @@ from drillctrl.plant import INPUT_NAMES, STATE_NAMES
 
 FloatArray = npt.NDArray[np.float64]
 DELAYS = ("fixed", "current")
+
+
+class ScheduleEntry(NamedTuple):
+    """Gains from some time on.
+
+    Attributes
+    ----------
+    time : float
+        From when.
+    K1, K2 : array_like, (m, p) or flat
+        As in `Controller`.
+    delay : float, optional
+        How long ago the delayed outputs are from then on; τ0 of the starting point if it is
+        left out, which is wrong where the rotary speed has changed.
+    """
+
+    time: float
+    K1: npt.ArrayLike
+    K2: npt.ArrayLike | None = None
+    delay: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +53,8 @@ class Controller:
     activation : float
         Time at which the controller is switched on; before it u = 0.
     delay : {"fixed", "current"}
-        Whether the delayed outputs are those of τ0 ago or of the present delay τ(t) ago.
+        Whether the delayed outputs are those of τ0 ago (or as the schedule says) or of the
+        present delay τ(t) ago.
     period : float, optional
         Sampling period; the command is held in between. Without it the law is continuous.
     measurement_delay : float
@@ -48,8 +70,8 @@ class Controller:
         Standard deviation by state name of the white noise added to each sample.
     seed : int
         Of the noise.
-    schedule : tuple of (float, array_like, array_like)
-        Later gains: from which time, K1, K2; times must rise.
+    schedule : tuple of ScheduleEntry, or of tuples like it
+        Later gains; times must rise.
 
     Raises
     ------
@@ -69,7 +91,7 @@ class Controller:
     rate_limit: float | None = None
     noise: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
-    schedule: tuple[tuple[float, npt.ArrayLike, npt.ArrayLike | None], ...] = ()
+    schedule: tuple[ScheduleEntry | tuple[Any, ...], ...] = ()
 
     def __post_init__(self) -> None:
         def put(name: str, value: object) -> None:
@@ -103,6 +125,7 @@ class Controller:
                 raise InputError("noise", name, f"of {', '.join(STATE_NAMES)}")
             checked_number(f"noise {name}", deviation, 0.0, 1e9)
         self.gains()
+        self.delays(0.0)
 
     def gains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return when each set of gains starts, and the gains on all states.
@@ -116,16 +139,39 @@ class Controller:
         assert isinstance(self.feedback, FeedbackStructure)
         rows = [_place("inputs", name, INPUT_NAMES) for name in self.feedback.inputs]
         columns = [_place("outputs", name, STATE_NAMES) for name in self.feedback.outputs]
-        entries = [(0.0, self.K1, self.K2), *self.schedule]
+        entries = [ScheduleEntry(0.0, self.K1, self.K2), *self._later]
         times = np.zeros(len(entries))
         full = np.zeros((2, len(entries), len(INPUT_NAMES), len(STATE_NAMES)))
-        for k, (start, now, past) in enumerate(entries):
+        for k, (start, now, past, _) in enumerate(entries):
             times[k] = checked_number("schedule", start, 0.0, 1e9)
             if k and not times[k] > times[k - 1]:
                 raise InputError("schedule", times[: k + 1].tolist(), "at rising times above 0")
             for which, matrix in enumerate(gain_matrices(self.feedback, now, past)):
                 full[which, k][np.ix_(rows, columns)] = matrix
         return times, full[0], full[1]
+
+    def delays(self, usual: float) -> FloatArray:
+        """Return how old the delayed outputs of each set of gains are, (g,), if it is fixed.
+
+        Parameters
+        ----------
+        usual : float
+            τ0 of the starting point.
+        """
+        given = [entry.delay for entry in self._later]
+        for delay in given:
+            if delay is not None:
+                checked_number("schedule delay", delay, 0.0, 1e9, open_low=True)
+                if self.delay == "current":
+                    raise InputError("schedule delay", delay, "left out with delay = current")
+        return np.array([usual, *(usual if delay is None else delay for delay in given)])
+
+    @property
+    def _later(self) -> tuple[ScheduleEntry, ...]:
+        for entry in self.schedule:
+            if not 2 <= len(entry) <= len(ScheduleEntry._fields):
+                raise InputError("schedule", entry, "of (time, K1, K2) or (time, K1, K2, delay)")
+        return tuple(ScheduleEntry(*entry) for entry in self.schedule)
 
 
 def _place(what: str, name: str, names: tuple[str, ...]) -> int:

@@ -243,7 +243,7 @@ def _nodes() -> tuple[FloatArray, FloatArray]:
 def _reach(run: Simulation, section: float, data: Any) -> float:
     """Return the earliest instant that the motion after the section depends on."""
     settings = run._compiled[0]
-    lag = float(np.max(settings.lags, initial=0.0))
+    lag = float(max(*settings.lags, settings.gains[:, data.PAST_AGE].max()))
     earliest = section - lag
     if run.model == "linear":
         return earliest

@@ -64,15 +64,15 @@ def settings_for(
     linear_rows[4, 8] = 2.0 * np.pi * point.delta0
     flags = np.zeros(7, dtype=np.int64)
     flags[data.LINEAR], flags[data.MULTIPLE] = linear, multiple
-    control = np.zeros(5)
-    limit, rate, lags = np.full(2, np.inf), np.full(2, np.inf), np.zeros(3)
+    control = np.zeros(4)
+    limit, rate, lags = np.full(2, np.inf), np.full(2, np.inf), np.zeros(2)
     times, K1, K2 = np.zeros(1), np.zeros((1, 2, 4)), np.zeros((1, 2, 4))
-    noise = np.zeros((0, 4))
+    noise, ages = np.zeros((0, 4)), np.zeros(1)
     if linear:
         lags[0] = point.delay
     if controller is not None:
         times, K1, K2 = controller.gains()
-        past = bool(K2.any())
+        past, ages = bool(K2.any()), controller.delays(point.delay)
         sampled = controller.period is not None
         current = controller.delay == "current" and not linear
         flags[data.FEEDBACK] = 1
@@ -82,7 +82,6 @@ def settings_for(
         flags[data.RATE_FEEDBACK] = bool(K1[:, :, [1, 3]].any() or K2[:, :, [1, 3]].any())
         control[data.T_ON] = controller.activation
         control[data.MEASURE_DELAY] = controller.measurement_delay
-        control[data.FEEDBACK_DELAY] = point.delay
         control[data.LAG_TIME] = controller.actuator_lag
         if controller.limit is not None:
             limit[:] = controller.limit
@@ -93,15 +92,15 @@ def settings_for(
             noise = _noise(controller, duration)
         else:
             lags[1] = controller.measurement_delay
-            if past and not current:
-                lags[2] = controller.measurement_delay + point.delay
+            reach = past and not current
+            ages = controller.measurement_delay + ages if reach else np.zeros_like(ages)
     return data.Settings(
         p=tuple(p.tolist()),
         flags=tuple(flags.tolist()),
         control=tuple(control.tolist()),
         limit=tuple(limit.tolist()),
         rate=tuple(rate.tolist()),
-        gains=np.column_stack([times, K1.reshape(-1, 8), K2.reshape(-1, 8)]),
+        gains=np.column_stack([times, K1.reshape(-1, 8), K2.reshape(-1, 8), ages]),
         drive=scenario.drive(point),
         linear=linear_rows,
         lags=tuple(lags.tolist()),
@@ -258,7 +257,8 @@ def _resume(past: Past, settings: Any, room: int) -> March:
     ints[march.I_TORSION], ints[march.I_AXIAL] = last[data.TORSION], last[data.AXIAL]
     # Another controller takes over: its torque need not continue the one before.
     ints[march.I_LEVEL] = 2
-    for i, lag in enumerate(settings.lags):
+    for i in range(3):
+        lag = kernel("model").lag_of(settings, i, 0)
         if lag > 0.0:
             ints[march.LAG0 + i] = kernel("interpolate").step_at(history, steps, -lag)
     if past.model == "nonlinear":

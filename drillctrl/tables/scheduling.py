@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-import numpy.typing as npt
 
 from drillctrl.errors import checked_number
 from drillctrl.operating_point import OperatingPoint
-from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.table import GainTable
-
-Entry = tuple[float, npt.ArrayLike, npt.ArrayLike | None]
 
 
 def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> FloatArray:
@@ -42,9 +41,12 @@ def scheduled(
     interval: float = 0.5,
     late: float = 0.0,
     duration: float = 1e4,
-    **options: float | None,
+    **options: float | str | None,
 ) -> Controller:
-    """Return a controller whose gains follow a table through a scenario.
+    """Return a controller whose gains and delay follow a table through a scenario.
+
+    The delayed outputs are those of τ0 ago at the rotary speed of each look-up, as in the
+    exported controllers; with ``delay="current"`` those of the present delay τ(t) ago.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def scheduled(
     Returns
     -------
     Controller
-        With the gains of the start and a schedule of later ones.
+        With the gains of the start and a schedule of later gains and delays.
 
     Raises
     ------
@@ -74,7 +76,7 @@ def scheduled(
         If a number is out of range.
     """
     spacing = checked_number("interval", interval, 0.0, 1e6, open_low=True)
-    delay = checked_number("late", late, 0.0, 1e6)
+    lateness = checked_number("late", late, 0.0, 1e6)
     times: list[float] = []
     for change in scenario.changes:
         end = change.time + change.duration
@@ -86,7 +88,14 @@ def scheduled(
     instants = np.array([0.0, *times])
     places = course(point, scenario, instants + 2e-9)
     K1, K2 = table.gains_at(*places.T)
-    entries: tuple[Entry, ...] = tuple(
-        (float(t) + delay, K1[i + 1], K2[i + 1]) for i, t in enumerate(times)
+    fixed = options.get("delay", "fixed") == "fixed"
+    entries = tuple(
+        ScheduleEntry(
+            float(t) + lateness,
+            K1[i],
+            K2[i],
+            replace(point, omega0=float(places[i, 0])).delay if fixed else None,
+        )
+        for i, t in enumerate(times, 1)
     )
     return Controller(table.structure, K1[0], K2[0], schedule=entries, **options)  # type: ignore[arg-type]

@@ -33,6 +33,19 @@ def test_imperfections_vanish_with_their_size(name, sizes, order):
     np.testing.assert_allclose(ratios, 2.0**order, rtol=0.25)
 
 
+@pytest.mark.parametrize("age", [0.001, 0.005, 0.05])
+def test_breaks_that_two_delays_bring_at_once_do_not_stop_a_run(age):
+    # A rate fed back late and later: a kick is seen after m ages and k delays, in any order.
+    point = OperatingPoint(6.0, 1.0, 14.0)
+    control = Controller("case2", [-9.389, 3.46], [10.0, -1.1557], measurement_delay=age)
+    run = simulate(point, control, duration=5.0, initial={"dtheta": 0.01})
+    assert run.status == "done"
+    times = np.linspace(1.0, 5.0, 301)
+    now, then = run.at(times - age), run.at(times - age - point.delay)
+    law = -9.389 * now.theta + 3.46 * now.dtheta + 10.0 * then.theta - 1.1557 * then.dtheta
+    np.testing.assert_allclose(run.at(times).torque, law, atol=1e-9)
+
+
 def test_sampled_command_is_the_law_at_the_samples():
     controller = Controller(*GAINS, period=0.1, activation=1.0)
     run = simulate(POINT, controller, duration=10.0, initial=KICK)

@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from drillctrl import (
     Change,
+    Controller,
+    InputError,
     OperatingPoint,
     Scenario,
     analyze,
@@ -11,6 +15,7 @@ from drillctrl import (
     simulate,
     table,
 )
+from drillctrl.simulation.controller import ScheduleEntry
 from drillctrl.tables.scheduling import course, scheduled
 
 START = OperatingPoint(10.0, 1.5, 12.0)
@@ -57,3 +62,51 @@ def test_gains_follow_the_rock_and_the_motion_settles(rocks):
 def test_a_controller_that_learns_late_switches_late(rocks):
     late = scheduled(rocks, START, Scenario(changes=(Change(5.0, psi=24.0),)), late=2.0)
     assert late.gains()[0].tolist() == [0.0, 7.0]
+
+
+@pytest.fixture(scope="module")
+def speeds():
+    """Gains over the rotary speed."""
+    return table(dimensionless_grid(linear_axis("omega0", 6, 12, 5), 1.0, 14.0), "case2")
+
+
+@pytest.mark.parametrize(("before", "after"), [(6.0, 12.0), (12.0, 6.0)])
+@pytest.mark.parametrize("options", [{}, {"period": 0.01}, {"measurement_delay": 0.002}])
+def test_the_delay_follows_the_rotary_speed(speeds, before, after, options):
+    point = OperatingPoint(before, 6.0 / before, 14.0)
+    ramp = Change(10.0, duration=5.0, omega0=after)
+    scenario = Scenario(initial={"dtheta": 0.01}, changes=(ramp,))
+    controller = scheduled(speeds, point, scenario, interval=1.0, **options)
+    run = simulate(point, controller, scenario=scenario, duration=40.0)
+    assert run.status == "done"
+
+    def deviation(times):
+        # The bit's angle, and rate, beyond what the top end turns after the ramp.
+        motion, turned = run.at(times), (after - before) * (times - 12.5)
+        return np.column_stack([motion.theta - turned, motion.dtheta - (after - before)])
+
+    times = np.linspace(16.0, 39.0, 50)
+    old = options.get("measurement_delay", 0.0)
+    if "period" in options:
+        times = options["period"] * np.round(times / options["period"])
+        old = 0.0
+    late = replace(point, omega0=after).delay
+    K1, K2 = (np.ravel(K) for K in controller.schedule[-1][1:3])
+    wanted = deviation(times - old) @ K1 + deviation(times - old - late) @ K2
+    found = run.at(times + 0.5 * options.get("period", 0.0)).torque
+    assert np.abs(found - wanted).max() < 1e-6
+    # It settles; with the delay of the start the bit would come to turn backwards.
+    assert np.ptp(deviation(np.linspace(35.0, 40.0, 99))[:, 0]) < 2e-3
+
+
+def test_gains_may_bring_a_delay_of_their_own():
+    later = ScheduleEntry(1.0, [-2.0], [2.0], 0.3)
+    given = Controller("case1", [-3.0], [3.0], schedule=(later, (2.0, [-1.0], [1.0])))
+    assert given.delays(0.25).tolist() == [0.25, 0.3, 0.25]
+    for wrong in (
+        {"schedule": (later,), "delay": "current"},
+        {"schedule": (later._replace(delay=-1.0),)},
+        {"schedule": ((1.0,),)},
+    ):
+        with pytest.raises(InputError, match="schedule"):
+            Controller("case1", [-3.0], [3.0], **wrong)

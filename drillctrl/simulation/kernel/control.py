@@ -10,10 +10,10 @@ from .data import (
     CURRENT_DELAY,
     DRIVE_T,
     FEEDBACK,
-    FEEDBACK_DELAY,
     LAG,
     LENGTH,
     MEASURE_DELAY,
+    PAST_AGE,
     PERIOD,
     SAMPLED,
     START,
@@ -85,7 +85,7 @@ def take_sample(settings, history, steps, ints, reals, t):
     k, period = ints[SAMPLE], settings.control[PERIOD]
     t_now = t - settings.control[MEASURE_DELAY]
     state = state_then(settings, history, steps, t_now)
-    lag = settings.control[FEEDBACK_DELAY]
+    lag = settings.gains[ints[GAINS], PAST_AGE]
     if settings.flags[CURRENT_DELAY] == 1:
         last = step_at(history, steps, t_now)
         j, s = locate_angle(

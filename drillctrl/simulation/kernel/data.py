@@ -32,7 +32,9 @@ MAX_FACE_LEVELS = 400
 # Entries of `flags`.
 LINEAR, MULTIPLE, FEEDBACK, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK = 0, 1, 2, 3, 4, 5, 6
 # Entries of `control`.
-T_ON, MEASURE_DELAY, FEEDBACK_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3, 4
+T_ON, MEASURE_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3
+# Column of `gains`, behind K1 and K2.
+PAST_AGE = 17
 # Columns of `drive`: start; top-end offset, speed, acceleration for x and θ; strength and slope.
 DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
 # Entries of `probe`, beside an event function's ingredients.
@@ -59,16 +61,18 @@ class Settings(NamedTuple):
         T_ON, MEASURE_DELAY, ...
     limit, rate : tuple, (2,)
         Of each input, infinite where there is none.
-    gains : array, (g, 17)
-        From when each set of gains holds; K1, then K2, by rows, on all states.
+    gains : array, (g, 18)
+        From when each set of gains holds; K1, then K2, by rows, on all states; PAST_AGE:
+        how old the delayed outputs are, sampled: beyond the measurement's age, continuous:
+        in all, 0 where there are none or they are those of τ(t) ago.
     drive : array, (m, 9)
         Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
     linear : array, (5, 10)
         A1, A2, B of the linear model side by side; below them the rows of the linear depth
         of cut, and its steady value.
-    lags : tuple, (3,)
-        Constant delays: of the linear model, of the measured and of the fed back signal; 0
-        where there is none.
+    lags : tuple, (2,)
+        Constant delays: of the linear model and of the measured signal; 0 where there is
+        none. See also `lag_of`.
     noise : array, (k, 4)
         Added to the k-th sample of the states.
     tolerance : tuple, (2,)

@@ -41,8 +41,8 @@ from .data import (
     Mode,
 )
 from .events import NONE, first_zero, value_on_step, watched
-from .interpolate import locate_time
-from .model import rate_of_change
+from .interpolate import locate_time, step_at
+from .model import lag_of, rate_of_change
 from .physics import rates
 from .step import STAGE_COLUMNS, STAGES, attempt, record
 from .switch import next_mode, next_saturation, snap
@@ -102,7 +102,7 @@ def time_limits(settings, history, steps, ints, following, t):
     """Nearest time at which a constant delay meets a break; and the longest step they allow."""
     nearest, longest = np.inf, np.inf
     for i in range(3):
-        lag = settings.lags[i]
+        lag = lag_of(settings, i, ints[GAINS])
         if lag > 0.0:
             longest = min(longest, lag)
             b = advance(history, steps, following, MAX_FACE_LEVELS + i, ints[LAG0 + i])
@@ -116,18 +116,28 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
     """Move constant delays along; return the level of the break that they bring."""
     level = NO_BREAK
     for i in range(3):
-        lag = settings.lags[i]
+        lag = lag_of(settings, i, ints[GAINS])
         if lag == 0.0:
             continue
         gain = 1 if i > 0 and settings.flags[RATE_FEEDBACK] == 1 else 2
         b = following[MAX_FACE_LEVELS + i]
-        while b < steps and history.real[b, START] + lag <= t:
+        # Breaks that several delays bring at once differ by rounding; no step fits in between.
+        while b < steps and history.real[b, START] + lag <= t + SHORTEST * max(1.0, abs(t)):
             level = min(level, history.whole[b, LEVEL] + gain)
             ints[LAG0 + i] = b
             b = advance(history, steps, following, MAX_FACE_LEVELS + i, b)
         j, _ = locate_time(history, steps, ints[LAG0 + i], t - lag)
         ints[LAG0 + i] = j
     return level
+
+
+@numba.njit(cache=True, error_model="numpy")
+def seek_past(settings, history, steps, ints, following, t):
+    """Find the delayed outputs anew, where other gains may want older or newer ones."""
+    lag = lag_of(settings, 2, ints[GAINS])
+    if lag > 0.0:
+        ints[LAG0 + 2] = step_at(history, steps, t - lag)
+        following[MAX_FACE_LEVELS + 2] = 0
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -307,8 +317,11 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             if ints[I_PASSES] > MAX_FACE_LEVELS:
                 return TOO_DEEP
             follow(settings, history, steps, mode_of(ints, reals, chain), chain, t, y[2])
+        gains = ints[GAINS]
         if take_sample(settings, history, steps, ints, reals, t):
             level = 2
+            if ints[GAINS] != gains:
+                seek_past(settings, history, steps, ints, following, t)
         if kind >= 0:
             snap(kind, y, p)
             level = min(level, level_of(settings, kind))

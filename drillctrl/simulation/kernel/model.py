@@ -27,6 +27,7 @@ from .data import (
     P_U0,
     P_U1,
     P_UP,
+    PAST_AGE,
     REVERSE,
     SAMPLED,
     START,
@@ -93,6 +94,14 @@ def within(value, limit):
 
 
 @numba.njit(cache=True, error_model="numpy")
+def lag_of(settings, i, gains):
+    """Constant delays: of the linear model, the measured and the fed back signal; 0: none."""
+    if i < 2:
+        return settings.lags[i]
+    return 0.0 if settings.flags[SAMPLED] == 1 else settings.gains[gains, PAST_AGE]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def wanted_at(settings, history, steps, mode, t, state, lagged):
     """Command of the controller at t before its limits."""
     flags = settings.flags
@@ -106,8 +115,8 @@ def wanted_at(settings, history, steps, mode, t, state, lagged):
     then, t_then = now, t_now
     if flags[CURRENT_DELAY] == 1:
         then, t_then = (lagged[0], lagged[1], lagged[2], lagged[3]), t - lagged[4]
-    elif settings.lags[2] > 0.0:
-        t_then = t - settings.lags[2]
+    elif lag_of(settings, 2, mode.gains) > 0.0:
+        t_then = t - lag_of(settings, 2, mode.gains)
         j, s = locate_time(history, steps, mode.lag2, t_then)
         then = state_at(history, j, s)
     now = measured(settings.drive, now, t_now)

@@ -34,7 +34,7 @@ from .data import (
     Mode,
 )
 from .interpolate import cubic, state_at, step_at
-from .model import piece_at, rate_of_change, strength_at
+from .model import lag_of, piece_at, rate_of_change, strength_at
 from .physics import load, rates
 
 COLUMNS = 14
@@ -45,9 +45,11 @@ def mode_on(settings, history, j):
     """The mode in which step j was taken."""
     t = history.real[j, START] + 0.5 * history.real[j, LENGTH]
     lags = np.zeros(3, np.int64)
+    gains = piece_at(settings.gains[:, 0], t)
     for i in range(3):
-        if settings.lags[i] > 0.0:
-            lags[i] = step_at(history, j, t - settings.lags[i]) if j > 0 else 0
+        lag = lag_of(settings, i, gains)
+        if lag > 0.0:
+            lags[i] = step_at(history, j, t - lag) if j > 0 else 0
     return Mode(
         history.whole[j, CONTACT],
         history.whole[j, TORSION],
@@ -60,7 +62,7 @@ def mode_on(settings, history, j):
         lags[1],
         lags[2],
         piece_at(settings.drive[:, DRIVE_T], t),
-        piece_at(settings.gains[:, 0], t),
+        gains,
         1 if settings.flags[FEEDBACK] == 1 and t >= settings.control[T_ON] else 0,
         history.real[j, HELD_U],
         history.real[j, HELD_U + 1],
