@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
@@ -14,12 +14,15 @@ import numpy as np
 
 from drillctrl.errors import InputError
 from drillctrl.files import replacing
-from drillctrl.tables.document import Document, announced_rows, from_document, to_document
+from drillctrl.tables.document import Document, checked_layout, from_document, to_document
 from drillctrl.tables.table import GainTable
 
 # Beyond this no table of at most a million nodes is meant.
-MAX_BYTES = 2_000_000_000
+MAX_BYTES = 1_000_000_000
 _WHOLE = ("stable", "certified")
+# Of a little-endian MATLAB 5 file: its version, and the types of its elements.
+_MAT_VERSION = b"\x00\x01IM"
+_MAT_MATRIX, _MAT_DOUBLES, _MAT_UTF8 = 14, 9, 16
 
 
 def save_table(table: GainTable, path: str | Path) -> None:
@@ -61,16 +64,15 @@ def load_table(path: str | Path) -> GainTable:
     source = Path(path)
     try:
         if source.stat().st_size > MAX_BYTES:
-            raise ValueError("a file of more than 2 GB")
-        document = _FORMATS[source.suffix.lower()][1](source)
+            raise ValueError("a file of more than 1 GB")
+        return from_document(_FORMATS[source.suffix.lower()][1](source))
     except OSError as error:
         reason = error.strerror or "not in the format of its ending"
         raise InputError("table", str(path), f"a readable file ({reason})") from None
     except Exception as error:
         # The readers of other packages raise whatever a broken file makes them raise.
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
         raise InputError("table", str(path), f"an intact gain table ({reason})") from None
-    return from_document(document)
 
 
 def check_table_path(path: str | Path) -> None:
@@ -110,8 +112,10 @@ def _read_csv(path: Path) -> Document:
             header[name.strip()] = json.loads(value)
         else:
             raise ValueError("no rows")
-        rows = announced_rows(header)
+        rows, announced = checked_layout(header)
         names = line.rstrip("\r\n").split(",")
+        if names != announced:
+            raise ValueError("columns that were not announced")
         values = np.zeros((len(names), rows))
         count = 0
         for count, row in enumerate(csv.reader(file), 1):
@@ -133,8 +137,10 @@ def _write_json(document: Document, file: IO[bytes]) -> None:
 def _read_json(path: Path) -> Document:
     data = json.loads(path.read_text(encoding="utf-8"))
     columns = data.pop("columns")
-    announced_rows(data)
-    return Document(data, {k: np.array(v, dtype=float) for k, v in columns.items()})
+    _, names = checked_layout(data)
+    if list(columns) != names:
+        raise ValueError("columns that were not announced")
+    return Document(data, {name: np.array(columns[name], dtype=float) for name in names})
 
 
 def _write_parquet(document: Document, file: IO[bytes]) -> None:
@@ -152,11 +158,14 @@ def _read_parquet(path: Path) -> Document:
 
     with pyarrow.parquet.ParquetFile(path) as file:
         header = json.loads(file.schema_arrow.metadata[b"drillctrl"])
-        if file.metadata.num_rows != announced_rows(header):
+        rows, names = checked_layout(header)
+        if file.metadata.num_rows != rows:
             raise ValueError(f"{file.metadata.num_rows} rows, which were not announced")
+        kinds = {name: "bool" if name in _WHOLE else "double" for name in names}
+        if {field.name: str(field.type) for field in file.schema_arrow} != kinds:
+            raise ValueError("columns that were not announced")
         data = file.read()
-    columns = {n: np.array(data[n].to_numpy(), dtype=float) for n in data.column_names}
-    return Document(header, columns)
+    return Document(header, {n: np.array(data[n].to_numpy(), dtype=float) for n in names})
 
 
 def _write_mat(document: Document, file: IO[bytes]) -> None:
@@ -172,17 +181,56 @@ def _write_mat(document: Document, file: IO[bytes]) -> None:
 
 
 def _read_mat(path: Path) -> Document:
-    import scipy.io
+    """Read what `_write_mat` writes.
 
-    content = path.read_bytes()
-    sizes = {name: shape for name, shape, _ in scipy.io.whosmat(io.BytesIO(content))}
-    if any(math.prod(shape) > MAX_BYTES // 8 for shape in sizes.values()):
-        raise ValueError("arrays that belong to no table")
-    data = scipy.io.loadmat(io.BytesIO(content))
-    header = json.loads(str(data["header"][0]))
-    announced_rows(header)
-    names = [name for name in data if not name.startswith("__") and name != "header"]
-    return Document(header, {name: np.array(data[name][:, 0], dtype=float) for name in names})
+    Not by scipy's `loadmat`: it takes a file's word for types and sizes, so that a wrong byte
+    ends the process, and a small compressed file fills the memory.
+    """
+    content = memoryview(path.read_bytes())
+    if bytes(content[124:128]) != _MAT_VERSION:
+        raise ValueError("not a MATLAB 5 file")
+    arrays: dict[str, tuple[int, memoryview]] = {}
+    place = 128
+    while place < len(content):
+        (kind, matrix), place = _mat_element(content, place)
+        if kind != _MAT_MATRIX:
+            raise ValueError("compressed, or no matrix; MATLAB writes others with save -v6")
+        name, number, data = _mat_array(matrix)
+        if name in arrays:
+            raise ValueError(f"{name[:60]} twice")
+        arrays[name] = number, data
+    header = json.loads(bytes(arrays.pop("header")[1]))
+    _, names = checked_layout(header)
+    if list(arrays) != names or any(number != _MAT_DOUBLES for number, _ in arrays.values()):
+        raise ValueError("columns that were not announced")
+    return Document(header, {n: np.frombuffer(arrays[n][1], "<f8").astype(float) for n in names})
+
+
+def _mat_element(content: memoryview, place: int) -> tuple[tuple[int, memoryview], int]:
+    """Return type and bytes of the element at a place, and where the next one stands."""
+    kind, size = struct.unpack_from("<II", content, place)
+    start, width = place + 8, size
+    if kind >> 16:  # up to four bytes stand in the tag itself
+        kind, size, start, width = kind & 0xFFFF, kind >> 16, place + 4, 4
+    if size > width or start + size > len(content):
+        raise ValueError("an array beyond the end of the file")
+    return (kind, content[start : start + size]), start + width + -(start + width) % 8
+
+
+def _mat_array(matrix: memoryview) -> tuple[str, int, memoryview]:
+    """Return name, number type and bytes of a real column of doubles or a row of text."""
+    parts, place = [], 0
+    while place < len(matrix):
+        part, place = _mat_element(matrix, place)
+        parts.append(part)
+    (_, flags), (_, shape), (_, name), (number, data) = parts
+    rows, columns = struct.unpack("<ii", shape)
+    described = bytes(flags), number, (len(data), rows, columns)
+    column = struct.pack("<II", 6, 0), _MAT_DOUBLES, (8 * rows, rows, 1)
+    text = struct.pack("<II", 4, 0), _MAT_UTF8, (columns, 1, columns)
+    if described not in (column, text):
+        raise ValueError("an array that is neither a column of doubles nor a text")
+    return bytes(name).decode("ascii"), number, data
 
 
 def _write_netcdf(document: Document, file: IO[bytes]) -> None:
@@ -220,15 +268,19 @@ def _read_netcdf(path: Path) -> Document:
     content = io.BytesIO(path.read_bytes())
     with xarray.open_dataset(content, engine="scipy", decode_cf=False) as data:
         header = json.loads(data.attrs["drillctrl_header"])
-        rows = announced_rows(header)
+        rows, names = checked_layout(header)
         axes = list(header["axes"])
         shape = tuple(len(values) for values in header["axes"].values())
         if tuple(data.sizes[name] for name in axes) != shape:
             raise ValueError("dimensions that were not announced")
         mesh = np.meshgrid(*(data[name].values for name in axes), indexing="ij")
-        columns = {n: m.ravel() for n, m in zip(axes, mesh, strict=True) if n in header["units"]}
-        for name in data.data_vars:
-            columns[str(name)] = np.array(data[name].values, dtype=float).reshape(rows)
+        columns = {n: m.ravel() for n, m in zip(axes, mesh, strict=True) if n in names}
+        if [*columns, *data.data_vars] != [*columns, *(n for n in names if n not in axes)]:
+            raise ValueError("variables that were not announced")
+        for name in map(str, data.data_vars):
+            if data[name].dtype.kind != "f":
+                raise ValueError(f"{name} not of doubles")
+            columns[name] = np.array(data[name].values, dtype=float).reshape(rows)
     return Document(header, columns)
 
 

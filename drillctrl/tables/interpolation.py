@@ -62,6 +62,17 @@ def cell_shape(grid: Grid) -> tuple[int, int, int]:
     return a, b, c
 
 
+def corners_of(grid: Grid) -> IntArray:
+    """Return the nodes at the corners of every cell, (c, 8)."""
+    return place(grid, _middles(grid, np.arange(math.prod(cell_shape(grid))))).corners
+
+
+def _middles(grid: Grid, cells: IntArray) -> FloatArray:
+    """Return the coordinates of the middles of cells, (c, 3)."""
+    origin = np.column_stack(np.unravel_index(cells, cell_shape(grid)))
+    return _to_coordinates(grid, origin, np.full((cells.size, 3), 0.5))
+
+
 def place(grid: Grid, coordinates: FloatArray) -> Place:
     """Find cells and weights of points, (q, 3) coordinates on the axes."""
     low, fraction = [], []
@@ -184,7 +195,7 @@ def check_cells(task: CellTask) -> tuple[IntArray, Cells]:
     total, count = math.prod(cell_shape(grid)), task.cells.size
     origin = np.column_stack(np.unravel_index(task.cells, cell_shape(grid)))
     worst, spread = _worst(grid, structure, gains, None, task.cells, origin)
-    corners = place(grid, _to_coordinates(grid, origin, np.full((count, 3), 0.5))).corners
+    corners = place(grid, _middles(grid, task.cells)).corners
     sound = task.stable[corners].all(axis=1)
     passed = sound & (worst + _MISSED * spread < 0.0)
     mode = np.where(passed, INTERPOLATED, UNSAFE)

@@ -1,3 +1,4 @@
+import copy
 import csv
 import json
 import pickle
@@ -128,14 +129,125 @@ def test_huge_announcements_are_refused_before_anything_is_read(small, tmp_path)
     assert "1600000000 rows announced" in refuse(path)
 
 
-def test_nan_gain_with_a_right_checksum_is_refused(small, tmp_path):
-    document = to_document(small)
-    columns = {**document.columns, "K1_1": np.full_like(document.columns["K1_1"], np.nan)}
-    header = {**document.header, "checksum": checksum(document.header, columns)}
-    path = tmp_path / "t.json"
+def forged(table, path, *, columns=None, **header):
+    """Write a JSON file whose checksum is right, whatever it says."""
+    document = to_document(table)
+    columns = {**document.columns, **(columns or {})}
+    header = {**copy.deepcopy(document.header), **header}
+    header["checksum"] = checksum(header, columns)
     lists = {name: values.tolist() for name, values in columns.items()}
     path.write_text(json.dumps({**header, "columns": lists}))
-    assert "K1_1 that is not finite" in refuse(path)
+    return path
+
+
+def test_forging_itself_is_not_what_is_refused(small, on_rig, tmp_path):
+    for table in (small, on_rig):
+        assert_same(table, load_table(forged(table, tmp_path / "t.json")))
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "reason"),
+    [
+        ("K1_1", np.nan, "K1_1 that is not finite"),
+        ("K1_1", 10.1, "gains outside their bounds"),
+        ("omega0", 7.0, "omega0 that does not follow"),
+        ("spectral_abscissa", 0.1, "stable node with a positive"),
+        ("stable", 0.0, "vouched for with a node that is not stable"),
+    ],
+)
+def test_senseless_numbers_with_a_right_checksum_are_refused(
+    column, value, reason, small, tmp_path
+):
+    values = to_document(small).columns[column].copy()
+    values[4] = value
+    assert reason in refuse(forged(small, tmp_path / "t.json", columns={column: values}))
+
+
+def test_columns_of_the_rig_follow_from_the_others(on_rig, tmp_path):
+    for name in ("K1_2_rig", "delay_s", "rotary_speed", "psi"):
+        values = 1.001 * to_document(on_rig).columns[name]
+        path = forged(on_rig, tmp_path / "t.json", columns={name: values})
+        assert f"{name} that does not follow" in refuse(path)
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "reason"),
+    [
+        ("structure", {"outputs": ["theta"] * 40_000}, "outputs"),
+        ("structure", {"outputs": ["*/ int x; /*"]}, "outputs"),
+        ("structure", {"inputs": ["brake"]}, "inputs"),
+        ("structure", {"name": "two\nlines"}, "a structure named"),
+        ("structure", {"K1_lower": [[5.0]], "K1_upper": [[-5.0]]}, "lower"),
+        ("cells", {"mode": [0.9] * 4}, "cells that do not fit"),
+        ("cells", {"mode": [1] * 4}, "constant gains"),
+        ("cells", {"mode": [3] * 4}, "cells that do not fit"),
+        ("cells", {"gains": {"-1": [1.0, 1.0]}}, "constant gains"),
+        ("cells", {"spectral_abscissa": [0.1] * 4}, "cell that is vouched for with a positive"),
+        ("reference", {"kind": "recipe"}, "recipe"),
+        ("units", {"K1_1": "N"}, "other columns or units"),
+    ],
+)
+def test_senseless_headers_with_a_right_checksum_are_refused(part, change, reason, small, tmp_path):
+    header = {part: {**to_document(small).header[part], **change}}
+    assert reason in refuse(forged(small, tmp_path / "t.json", **header))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("give_up", 7.0), ("seed", -1), ("fallback", "hope"), ("objective", 3), ("schema", "x")],
+)
+def test_senseless_settings_are_refused(name, value, small, tmp_path):
+    refuse(forged(small, tmp_path / "t.json", **{name: value}))
+
+
+def test_more_columns_than_announced_are_refused(small, tmp_path):
+    extra = {f"x{i}": np.zeros(9) for i in range(300)}
+    assert "columns" in refuse(forged(small, tmp_path / "t.json", columns=extra))
+    save_table(small, tmp_path / "t.parquet")
+    frame = pyarrow.parquet.read_table(tmp_path / "t.parquet")
+    pyarrow.parquet.write_table(frame.append_column("x", frame["psi"]), tmp_path / "t.parquet")
+    assert "columns that were not announced" in refuse(tmp_path / "t.parquet")
+
+
+def test_deep_nesting_is_refused(tmp_path):
+    path = tmp_path / "t.json"
+    path.write_text('{"schema":' + "[" * 100_000 + "]" * 100_000 + "}")
+    refuse(path)
+
+
+def matlab_file(path, table, **options):
+    document = to_document(table)
+    fields = {name: values[:, None] for name, values in document.columns.items()}
+    fields["header"] = json.dumps(document.header)
+    scipy.io.savemat(path, {**fields, **options.pop("fields", {})}, **options)
+    return path
+
+
+def test_other_matlab_files_are_refused(small, tmp_path):
+    path = tmp_path / "t.mat"
+    assert_same(small, load_table(matlab_file(path, small)))
+    assert "-v6" in refuse(matlab_file(path, small, do_compression=True))
+    gains = to_document(small).columns["K1_1"][:, None]
+    for wrong in (gains + 1j, gains.T, gains.astype(np.float32), "text", {"a": gains}):
+        refuse(matlab_file(path, small, fields={"K1_1": wrong}))
+    refuse(matlab_file(path, small, fields={"more": gains}))
+    refuse(matlab_file(path, small, format="4"))
+
+
+def test_a_matlab_file_with_any_byte_changed_is_refused_or_the_same(small, tmp_path):
+    path = tmp_path / "t.mat"
+    save_table(small, path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
+    for place in [*range(116, 700), *rng.integers(700, len(whole), 200).tolist()]:
+        for value in (0, 8, 255):
+            changed = bytearray(whole)
+            changed[place] = value
+            path.write_bytes(changed)
+            try:
+                assert_same(small, load_table(path))
+            except InputError as error:
+                assert "\n" not in str(error)
 
 
 def test_unknown_endings_and_missing_files(small, tmp_path):
