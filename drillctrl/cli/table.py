@@ -61,6 +61,8 @@ _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
 )
 @click.option("--period", type=float, help="Sampling period of a .c or .st controller.")
 @click.option("--limit", type=float, help="Largest |u| of a .c or .st controller.")
+@click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
+@click.option("--real", help="Of a .c controller: double (default) or float.")
 @click.option("--require-stable", is_flag=True, help="Exit with 3 if a node is not stable.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option(

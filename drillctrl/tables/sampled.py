@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import re
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.tables.document import SIGN, rig_gain_units, to_document
+from drillctrl.plant import STATE_NAMES
+from drillctrl.tables.document import rig_gain_units, to_document
+from drillctrl.tables.grid import DIMENSIONLESS
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
 from drillctrl.tables.table import GainTable
 
@@ -36,6 +41,8 @@ class SampledController:
         Entries of K1, then K2, of the cells with constant gains.
     words : dict of str to str
         What stands for ``@word@`` in a template.
+    reference : tuple of str
+        Lines that say what the table was made for.
     """
 
     period: float
@@ -45,10 +52,16 @@ class SampledController:
     cell_mode: tuple[int, ...]
     cell_gains: tuple[float, ...]
     words: dict[str, str]
+    reference: tuple[str, ...]
+
+    @property
+    def stamp(self) -> str:
+        """Eight hexadecimal digits that no other controller shares."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
 
 
 def sampled_controller(
-    table: GainTable, name: str, period: float, limit: float, ramp: int
+    table: GainTable, name: str, period: float, limit: float, ramp: int | None
 ) -> SampledController:
     """Check what a controller is to be, and collect what its source says.
 
@@ -64,10 +77,12 @@ def sampled_controller(
     """
     step = checked_number("period", period, 0.0, 1e6, open_low=True)
     bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    count = checked_integer("ramp", ramp, 0, 10**9)
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
         raise InputError("name", name, "an identifier of at most 31 characters")
     structure, rig, factors = table.structure, table.grid.rig, rig_gain_units(table)
+    # The words go into comments, which other names might end.
+    if not set(structure.outputs) <= set(STATE_NAMES):
+        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(STATE_NAMES)}")
     if len(structure.inputs) != 1:
         raise InputError("structure", structure.name, "one with a single input")
     if rig is not None and factors is None:
@@ -78,18 +93,32 @@ def sampled_controller(
     if depth > _DEEPEST:
         least = longest / _DEEPEST
         raise InputError("period", step, f"at least {least:g}, for a delay of {longest:g}")
+    # By default as long as the delayed outputs take to come in.
+    count = depth - 3 if ramp is None else checked_integer("ramp", ramp, 0, 10**9)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
     constant = mode == CONSTANT
     listed = np.where(constant, np.cumsum(constant), np.where(mode == UNSAFE, -1, 0))
     bounds = zip(structure.entry_names, structure.flat_lower, structure.flat_upper, strict=True)
+    groups = dataclasses.asdict(table.grid.reference)
+    # Those that vary over the grid are axes, and λ does with ψ.
+    varying = (*DIMENSIONLESS, "lam", "rock_strength")
+    given = {k: v for k, v in groups.items() if k not in varying}
+    text = ", ".join(f"{k} {v:g}" for k, v in given.items())
+    law = "u = K1 Y(t) + K2 Y(t - delay)"
     words = {
         "name": name,
-        "sign": SIGN.replace("theta''", "the torsional acceleration"),
+        "law": f"{law}, in units of the torsional stiffness, on the bit in its sense of rotation"
+        if rig is None
+        else f"{law}, a torque in N m on the bit in its sense of rotation",
+        "delay": f"tau0 = 2 pi/({table.grid.points[0].blades:g} omega0)"
+        if rig is None
+        else f"tau0 = 2 pi/({rig.blades:g} x rotary speed in rad/s), in s",
         "names": ", ".join(structure.outputs),
         "units": "dimensionless" if rig is None else "rad, rad/s, s, N m",
         "sampling": f"every {step:g}{'' if rig is None else ' s'}, "
-        f"magnitude of u at most {bound:g}{'' if rig is None else ' N m'}",
+        f"magnitude of u at most {bound:g}{'' if rig is None else ' N m'}, "
+        f"switched on over {count} samples",
         "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
         "bounds": ", ".join(f"{entry} {low:g}..{high:g}" for entry, low, high in bounds),
         "checksum": to_document(table).header["checksum"],
@@ -105,6 +134,7 @@ def sampled_controller(
         tuple(listed.tolist()),
         tuple((table.entries_of(table.cells.gains[constant]) * scale).ravel().tolist()),
         words,
+        tuple(textwrap.wrap(f"{'Groups' if rig is None else 'Rig (SI)'}: {text}", 80)),
     )
 
 

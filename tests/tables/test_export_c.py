@@ -17,6 +17,9 @@ FLAGS = [
     "-Werror",
     "-pedantic",
     "-Wconversion",
+    "-Wfloat-equal",
+    "-Wshadow",
+    "-Wmissing-prototypes",
     "-ffp-contract=off",
 ]
 
@@ -36,6 +39,10 @@ class Compiled:
         self.library.drill_step.restype = self.kind
         self.outputs = len(table.structure.outputs)
         self.state = ctypes.create_string_buffer(1_000_000)
+        depth = int(header.read_text().split("_DEPTH ")[1].split()[0])
+        self.vouched = ctypes.c_int32.from_buffer(
+            self.state, depth * self.outputs * ctypes.sizeof(self.kind) + 8
+        )
         self.library.drill_init(self.state)
         self.header = header.read_text()
 
@@ -102,12 +109,51 @@ def test_float_soft_start_and_switching(small, tmp_path):
     assert on[:10] == pytest.approx([full * (i + 1) / 10 for i in range(10)], rel=1e-5)
     assert on[10:] == pytest.approx([full] * 10, rel=1e-5)
     assert compiled.step([float("nan")], at, delay) == 0.0
+    assert compiled.step([float("inf")], at, delay) == 0.0
+    compiled.library.drill_init(compiled.state)
     assert compiled.step([1e9], at, delay) == pytest.approx(np.sign(K1.item()) * LIMIT)
+
+
+def test_by_default_it_is_switched_on_over_a_delay(small, tmp_path):
+    compiled = Compiled(small, tmp_path, ramp=None)
+    longest = max(point.delay for point in small.grid.points)
+    samples = int(longest / PERIOD)
+    for _ in range(100):
+        compiled.step([0.1], (8.0, 2.0, 14.0), longest, 0)
+    on = [compiled.step([0.1], (8.0, 2.0, 14.0), longest) for _ in range(samples + 5)]
+    assert on[0] == pytest.approx(on[-1] / samples)
+    assert np.argmax(np.isclose(on, on[-1], rtol=1e-12)) == samples - 1
+
+
+def test_the_state_says_whether_the_table_vouches(small, tmp_path):
+    compiled = Compiled(small, tmp_path)
+    for at, on in (((10.0, 2.0, 14.0), 1), ((10.0, 20.0, 14.0), 1), ((9.0, 5.0, 14.0), 0)):
+        compiled.step([0.1], at, POINT.delay, on)
+        assert compiled.vouched.value == small.stable_at(*at)[0]
+
+
+def test_a_header_of_another_table_is_not_compiled(small, tmp_path):
+    header, source = export_c(small, tmp_path, period=PERIOD, limit=LIMIT)
+    command = ["gcc", *FLAGS, "-c", str(source), "-o", str(tmp_path / "t.o")]
+    assert subprocess.run(command, check=False).returncode == 0
+    before = header.read_text()
+    export_c(small, tmp_path, period=PERIOD, limit=2 * LIMIT)
+    header.write_text(before)
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "different tables" in run.stderr
+
+
+def test_a_header_of_someone_else_is_left_alone(small, tmp_path):
+    (tmp_path / "gain_table.h").write_text("/* mine */")
+    with pytest.raises(InputError, match="out of the way"):
+        export_c(small, tmp_path, period=PERIOD, limit=LIMIT)
+    assert (tmp_path / "gain_table.h").read_text() == "/* mine */"
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_header_says_what_it_holds_and_bad_input_is_refused(small, tmp_path):
     compiled = Compiled(small, tmp_path)
-    for word in ("SHA-256", "omega0 (1)", "theta", "K1_1 -10..10"):
+    for word in ("SHA-256", "omega0 (1)", "theta", "K1_1 -10..10", "eta 1.6", "2 pi/(4 omega0)"):
         assert word in compiled.header
     for wrong in ({"name": "1x"}, {"period": 0.0}, {"limit": -1.0}, {"real": "half"}):
         with pytest.raises(InputError):

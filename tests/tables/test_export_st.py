@@ -15,7 +15,7 @@ WORDS = {
     "NOT": "not",
     "TRUE": "True",
     "FALSE": "False",
-    "LREAL_TO_DINT": "int",
+    "DINT_TO_LREAL": "float",
     "TRUNC": "int",
 }
 
@@ -66,7 +66,7 @@ def to_python(text):
 
 
 def test_the_block_parses_and_gives_the_simulators_command(small, tmp_path):
-    path = export_st(small, tmp_path / "drill.st", period=PERIOD, limit=LIMIT)
+    path = export_st(small, tmp_path / "drill.st", period=PERIOD, limit=LIMIT, ramp=0)
     text = path.read_text()
     assert parse_source_code(text).exception is None
     step, state = to_python(text)
@@ -79,7 +79,7 @@ def test_the_block_parses_and_gives_the_simulators_command(small, tmp_path):
     held = run.at(start + (samples + 0.5) * PERIOD).torque
     commanded = []
     for k, y in zip(samples.tolist(), theta.tolist(), strict=True):
-        state.update(Y=[y], Place=[10.0, 2.5, 14.0], Delay=POINT.delay, On=k >= 0)
+        state.update(Y=[y], Place=[10.0, 2.5, 14.0], Delay=POINT.delay, Enable=k >= 0)
         step(state)
         commanded.append(state["U"])
     assert np.abs(held - commanded).max() < 1e-12
@@ -104,7 +104,7 @@ def test_lookup_equals_python(small, on_rig, tmp_path):
             if rig is not None:
                 expected *= rig.torsional_stiffness * np.array([1.0, rig.time_scale] * 2)
             count = len(table.structure.outputs)
-            state.update(Y=[0.0] * count, Place=place.tolist(), Delay=0.1, On=False)
+            state.update(Y=[0.0] * count, Place=place.tolist(), Delay=0.1, Enable=False)
             step(state)
             assert state["Gains"] == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
             assert state["Vouched"] == table.stable_at(*groups)[0]
