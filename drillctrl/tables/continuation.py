@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,7 @@ def design_grid(
     seed: int,
     run: Mapper,
     objective: Objective = EXACT,
+    known: Mapping[int, NodeDesign] | None = None,
 ) -> list[NodeDesign]:
     """Design every node of a grid.
 
@@ -56,20 +57,24 @@ def design_grid(
         does not depend on how: tasks of one wave do not depend on each other.
     objective : Objective
         Other than the exact abscissa, each node is designed on its own.
+    known : mapping of int to NodeDesign, optional
+        Designs of some nodes; all others begin at those beside them.
 
     Returns
     -------
     list of NodeDesign
         In the order of the nodes.
     """
-    found: dict[int, NodeDesign] = {}
+    found = dict(known or {})
     if not isinstance(objective, Exact):
         alone = [
             NodeTask(i, point, structure, seed, objective=objective)
             for i, point in enumerate(grid.points)
+            if i not in found
         ]
-        return sorted(run(design_node, alone), key=lambda design: design.index)
-    stride = _coarse_stride(grid.shape)
+        designs = [*found.values(), *run(design_node, alone)]
+        return sorted(designs, key=lambda design: design.index)
+    stride = 1 if found else _coarse_stride(grid.shape)
     apart = _ONE_BASIN * (structure.upper - structure.lower)
     # The same task again would end the same.
     tried: set[tuple[int, bytes, Active]] = set()
@@ -81,8 +86,8 @@ def design_grid(
         ]
         tasks = []
         for i in chosen:
-            known, active = _nearby(grid.shape, i, stride, found, apart)
-            tasks.append(NodeTask(i, grid.points[i], structure, seed, known, active=active))
+            gains, active = _nearby(grid.shape, i, stride, found, apart)
+            tasks.append(NodeTask(i, grid.points[i], structure, seed, gains, active=active))
         tried.update(map(_key, tasks))
         found.update({design.index: design for design in run(design_node, tasks)})
         stride //= 2

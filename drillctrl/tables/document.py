@@ -27,7 +27,7 @@ from drillctrl.tables.interpolation import (
     cell_shape,
     corners_of,
 )
-from drillctrl.tables.table import FALLBACKS, GainTable
+from drillctrl.tables.table import ABSCISSA_ERROR, FALLBACKS, GainTable
 
 SCHEMA = "drillctrl/gain-table/1"
 SIGN = "u = K1 Y(t) + K2 Y(t - tau0) is added to theta''; Y: outputs; tau0 = 2 pi/(blades omega0)"
@@ -196,6 +196,7 @@ def from_document(document: Document) -> GainTable:
         structure,
         gains,
         columns["spectral_abscissa"],
+        columns[ABSCISSA_ERROR],
         columns["stable"] != 0.0,
         columns["certified"] != 0.0,
         columns["best_abscissa"],
@@ -220,10 +221,11 @@ def _read_structure(layout: dict[str, Any]) -> FeedbackStructure:
         names = layout[what]
         if not (1 <= len(names) <= len(known) and set(names) <= set(known)):
             raise ValueError(f"{what} {str(names)[:60]}")
+    bounds = {name: np.array(layout[name], dtype=float) for name in _BOUNDS}
     return FeedbackStructure(
         _words("a structure named", layout["name"]),
         tuple(layout["outputs"]),
-        *(np.array(layout[name], dtype=float) for name in _BOUNDS),
+        **bounds,
         inputs=tuple(layout["inputs"]),
         ties=tuple(Tie(*tie) for tie in layout["ties"]),
     )
@@ -262,6 +264,8 @@ def _check_consistency(table: GainTable, document: Document) -> None:
         # What follows from the axes may differ in the last bit where another machine made it.
         if not np.allclose(document.columns[name], values, rtol=1e-9, atol=0.0):
             raise ValueError(f"a {name} that does not follow from the rest")
+    if (table.abscissa_error < 0.0).any():
+        raise ValueError("a negative error of the spectral abscissa")
     if (table.spectral_abscissa[table.stable] >= 0.0).any():
         raise ValueError("a stable node with a positive spectral abscissa")
     vouched = table.cells.mode != UNSAFE

@@ -31,6 +31,7 @@ _INSIDE = 0.05
 _KEPT = 4
 # Residual of the first-order conditions up to which an optimum counts as followed.
 _STATIONARY = 1e-6
+_UNKNOWN = float(np.finfo(float).max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +162,7 @@ class NodeCheck:
 
     index: int
     spectral_abscissa: float
+    abscissa_error: float
     stable: bool
     certified: bool
 
@@ -169,4 +171,11 @@ def check_node(task: NodeTask) -> NodeCheck:
     """Analyse the loop that the first known gains close at a node."""
     family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
     loop = analyze_loop(family.loop(task.known[0]))
-    return NodeCheck(task.index, loop.spectral_abscissa, loop.stable, loop.certificate.agrees)
+    return NodeCheck(
+        task.index,
+        loop.spectral_abscissa,
+        # Files hold finite numbers only.
+        float(np.nan_to_num(loop.abscissa_error, nan=_UNKNOWN, posinf=_UNKNOWN)),
+        loop.stable,
+        loop.certificate.agrees,
+    )

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.grid import Axis
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, cell_shape
 from drillctrl.tables.table import GainTable
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# A title, and what draws below it.
+Panel = tuple[str, Callable[["Axes"], None]]
+
+_MOST_LAYERS = 8
 _NAMES = {
     "omega0": "rotary speed ω0",
     "delta0": "depth of cut δ0",
@@ -30,65 +38,127 @@ def axis_label(axis: Axis) -> str:
 
 
 def plot_table(table: GainTable) -> Figure:
-    """Draw each gain and α over the two longest axes, at the middle of the third.
+    """Draw each free gain and α over the grid.
 
-    Nodes that nothing stabilises are crosses; cells that did not pass are hatched, those with
-    constant gains dotted.
+    Over one axis as lines, over two as maps; over three the gains are those at the middle of
+    the shortest axis, and α is drawn at each of its values, or at eight of them. Nodes that
+    nothing stabilises are crosses; cells that did not pass are hatched, those with constant
+    gains dotted.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+
+    panels = _panels(table)
+    columns = min(3, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    figure = Figure(figsize=(max(4.0 * columns, 6.5), 3.3 * rows + 0.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    held = [axis.text(*axis.values) for axis in table.grid.axes if len(axis.values) == 1]
+    for ax, (title, draw) in zip(axes, panels, strict=False):
+        draw(ax)
+        ax.set_title(title)
+    for ax in axes[len(panels) :]:
+        ax.set_axis_off()
+    marks = "× not stable, //// not vouched for, · constant gains"
+    figure.suptitle(f"{table.structure.name}, {', '.join([*held, marks])}", fontsize="medium")
+    return figure
+
+
+def _panels(table: GainTable) -> list[Panel]:
+    free = table.structure.spread.any(axis=1)
+    names = np.array(table.structure.entry_names)[free].tolist()
+    fields = dict(zip(names, table.entries.T[free], strict=True))
+    grid = table.grid
+    if len(grid.points) == 1:
+        fields["α"] = table.spectral_abscissa
+        return [("one node", functools.partial(_values, fields))]
+    if sorted(grid.shape)[1] == 1:
+        along = int(np.argmax(grid.shape))
+        lines: list[Panel] = [
+            (name, functools.partial(_line, table, along, column))
+            for name, column in zip(names, np.flatnonzero(free).tolist(), strict=True)
+        ]
+        return [*lines, ("α", functools.partial(_line, table, along, None))]
+    # Of equally short axes the last.
+    across = 2 - int(np.argmin(grid.shape[::-1]))
+    depth, third = grid.shape[across], grid.axes[across]
+    maps: list[Panel] = [
+        (
+            name if depth == 1 else f"{name} at {third.text(third.values[depth // 2])}",
+            functools.partial(_map, table, across, depth // 2, values, "viridis"),
+        )
+        for name, values in fields.items()
+    ]
+    shown = np.unique(np.linspace(0, depth - 1, min(depth, _MOST_LAYERS)).round().astype(int))
+    for layer in shown.tolist():
+        title = "α" if depth == 1 else f"α at {third.text(third.values[layer])}"
+        alpha = table.spectral_abscissa
+        maps.append((title, functools.partial(_map, table, across, layer, alpha, "RdBu_r")))
+    return maps
+
+
+def _values(fields: dict[str, FloatArray], ax: Axes) -> None:
+    text = "\n".join(f"{name} = {values[0]:.6g}" for name, values in fields.items())
+    ax.text(0.5, 0.5, text, ha="center", va="center", fontsize="large", transform=ax.transAxes)
+    ax.set_axis_off()
+
+
+def _line(table: GainTable, along: int, column: int | None, ax: Axes) -> None:
+    """Draw an entry of (K1, K2), or α for None, over the one axis that there is."""
+    axis = table.grid.axes[along]
+    x = np.array(axis.values) * axis.field_unit[1]
+    values = table.spectral_abscissa if column is None else table.entries[:, column]
+    constant = table.cells.mode == CONSTANT
+    if column is None:
+        ax.plot(x, values, marker=".")
+        ax.axhline(0.0, color="black", linewidth=0.8)
+        worst = table.cells.spectral_abscissa
+        ax.hlines(worst, x[:-1], x[1:], color="C1", label="worst found between")
+        ax.legend(fontsize="small")
+    else:
+        ax.plot(x, values, marker=".", linestyle="")
+        steady = table.entries_of(table.cells.gains)[:, column]
+        for i in range(x.size - 1):
+            ends = [steady[i]] * 2 if constant[i] else values[i : i + 2]
+            ax.plot(x[i : i + 2], ends, color="C0")
+    for kind, hatch in ((UNSAFE, "////"), (CONSTANT, "..")):
+        for i in np.flatnonzero(table.cells.mode == kind).tolist():
+            ax.axvspan(x[i], x[i + 1], fill=False, hatch=hatch, linewidth=0.0, alpha=0.4)
+    ax.scatter(x[~table.stable], values[~table.stable], marker="x", c="black", zorder=3)
+    ax.set_xlabel(axis_label(axis))
+
+
+def _map(
+    table: GainTable, across: int, layer: int, values: FloatArray, colours: str, ax: Axes
+) -> None:
+    """Draw values over two axes at one value of the third."""
     from matplotlib.patches import Rectangle
 
     grid = table.grid
-    # Of equally short axes the last.
-    across = 2 - int(np.argmin(grid.shape[::-1]))
     down, up = (axis for axis in range(3) if axis != across)
-    middle = grid.shape[across] // 2
 
-    def layer(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return np.asarray(np.take(values.reshape(grid.shape), middle, axis=across))
+    def cut(given: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.asarray(np.take(given.reshape(grid.shape), layer, axis=across))
 
-    fields = dict(zip(table.structure.entry_names, table.entries.T, strict=True))
-    fields = {k: v for k, v in fields.items() if np.ptp(v) > 0.0}
-    fields["α"] = table.spectral_abscissa
-    columns = min(3, len(fields))
-    rows = math.ceil(len(fields) / columns)
-    figure = Figure(figsize=(4.0 * columns, 3.3 * rows + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     x, y = (np.array(axis.values) * axis.field_unit[1] for axis in (grid.axes[down], grid.axes[up]))
-    stable = layer(table.stable)
-    at_x, at_y = np.meshgrid(x, y, indexing="ij")
-    slot = min(middle, cell_shape(grid)[across] - 1)
-    mode = np.take(table.cells.mode.reshape(cell_shape(grid)), slot, axis=across)
-    for ax, (name, values) in zip(axes, fields.items(), strict=False):
-        shown = layer(values)
-        if name == "α":
-            reach = float(np.abs(shown).max())
-            picture = ax.pcolormesh(
-                x, y, shown.T, shading="nearest", cmap="RdBu_r", vmin=-reach, vmax=reach
-            )
-        else:
-            picture = ax.pcolormesh(x, y, shown.T, shading="nearest", cmap="viridis")
-        figure.colorbar(picture, ax=ax)
-        ax.scatter(at_x[~stable], at_y[~stable], marker="x", c="black", s=18, linewidths=0.9)
-        for kind, hatch in ((UNSAFE, "////"), (CONSTANT, "..")):
-            for i, j in np.argwhere(mode == kind).tolist():
-                if i + 1 < len(x) and j + 1 < len(y):
-                    size = x[i + 1] - x[i], y[j + 1] - y[j]
-                    ax.add_patch(
-                        Rectangle((x[i], y[j]), *size, fill=False, hatch=hatch, linewidth=0.0)
-                    )
-        ax.set_title(name)
-        ax.set_xlabel(axis_label(grid.axes[down]))
-        ax.set_ylabel(axis_label(grid.axes[up]))
-    for ax in axes[len(fields) :]:
-        ax.set_axis_off()
-    third = grid.axes[across]
-    held = third.values[middle] * third.field_unit[1]
-    note = "× not stable, //// not vouched for, · constant gains"
-    figure.suptitle(
-        f"{table.structure.name} at {axis_label(third)} = {held:.4g};  {note}",
-        fontsize="medium",
+    # Colours for α are white at 0.
+    reach = float(np.abs(values).max()) if colours == "RdBu_r" else None
+    low = None if reach is None else -reach
+    picture = ax.pcolormesh(
+        x, y, cut(values).T, shading="nearest", cmap=colours, vmin=low, vmax=reach
     )
-    return figure
+    ax.figure.colorbar(picture, ax=ax)
+    stable = cut(table.stable)
+    at_x, at_y = np.meshgrid(x, y, indexing="ij")
+    ax.scatter(at_x[~stable], at_y[~stable], marker="x", c="black", s=18, linewidths=0.9)
+    # The cells on both sides of the layer; of two marks the graver one.
+    sides = cell_shape(grid)
+    beside = sorted({min(max(side, 0), sides[across] - 1) for side in (layer - 1, layer)})
+    mode = np.take(table.cells.mode.reshape(sides), beside, axis=across).max(axis=across)
+    for kind, hatch in ((UNSAFE, "////"), (CONSTANT, "..")):
+        for i, j in np.argwhere(mode == kind).tolist():
+            size = x[i + 1] - x[i], y[j + 1] - y[j]
+            ax.add_patch(Rectangle((x[i], y[j]), *size, fill=False, hatch=hatch, linewidth=0.0))
+    ax.set_xlabel(axis_label(grid.axes[down]))
+    ax.set_ylabel(axis_label(grid.axes[up]))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.feedback import BoolArray, FeedbackStructure
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.continuation import edges
 from drillctrl.tables.grid import Grid
+from drillctrl.tables.interpolation import CONSTANT, Cells, cell_shape, corners_of
 
 _SWEEPS = 40
 _FRACTIONS = np.array([1.0, 0.7, 0.4, 0.2, 0.08, 0.03])
@@ -110,9 +112,12 @@ def _cost(vector: FloatArray, around: FloatArray, width: FloatArray) -> float:
 
 
 def largest_jump(
-    grid: Grid, structure: FeedbackStructure, gains: FloatArray, counted: BoolArray
+    grid: Grid, structure: FeedbackStructure, gains: FloatArray, counted: BoolArray, cells: Cells
 ) -> tuple[float, tuple[int, int] | None]:
     """Return the largest change of a gain between neighbours, and between which nodes.
+
+    Beside changes from node to node these are the steps at the borders of cells with constant
+    gains: on a face between two cells a step is largest at a node.
 
     Parameters
     ----------
@@ -122,19 +127,52 @@ def largest_jump(
         Gain vectors.
     counted : bool array, (q,)
         Nodes that are looked at.
+    cells : Cells
+        What is known between them.
 
     Returns
     -------
     float
         As a share of the width of the gain's bounds; 0 without neighbours.
     tuple of int, or None
-        The two nodes.
+        The two nodes; twice the same one for a step at the border of a cell.
     """
-    pairs = edges(grid.shape)
-    pairs = pairs[np.asarray(counted)[pairs].all(axis=1)]
-    if not len(pairs) or not gains.shape[1]:
-        return 0.0, None
     width = structure.upper - structure.lower
-    jumps = np.abs((gains[pairs[:, 0]] - gains[pairs[:, 1]]) / width).max(axis=1)
+    if not gains.shape[1]:
+        return 0.0, None
+    pairs, jumps = _between_nodes(grid, gains / width, counted, cells)
+    borders, steps = _between_cells(grid, gains / width, cells, width)
+    pairs, jumps = np.concatenate([pairs, borders]), np.concatenate([jumps, steps])
+    if not len(pairs):
+        return 0.0, None
     worst = int(np.argmax(jumps))
     return float(jumps[worst]), (int(pairs[worst, 0]), int(pairs[worst, 1]))
+
+
+def _between_nodes(
+    grid: Grid, gains: FloatArray, counted: BoolArray, cells: Cells
+) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Return neighbours between which some cell interpolates, and how far apart they are."""
+    pairs = edges(grid.shape)
+    # Corners stand in the order of a binary number: those of one edge differ in one digit.
+    ends = np.array([(i, i | digit) for digit in (1, 2, 4) for i in range(8) if not i & digit])
+    joined = corners_of(grid)[cells.mode != CONSTANT][:, ends].reshape(-1, 2)
+    bridged = np.isin(pairs @ (len(gains), 1), joined @ (len(gains), 1))
+    pairs = pairs[np.asarray(counted)[pairs].all(axis=1) & bridged]
+    return pairs, np.abs(gains[pairs[:, 0]] - gains[pairs[:, 1]]).max(axis=1, initial=0.0)
+
+
+def _between_cells(
+    grid: Grid, gains: FloatArray, cells: Cells, width: FloatArray
+) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Return nodes on the borders of cells with constant gains, and the steps there."""
+    corners, constant = corners_of(grid), cells.mode == CONSTANT
+    nodes, steps = [], []
+    for low, high in edges(cell_shape(grid)).tolist():
+        if not constant[low] and not constant[high]:
+            continue
+        for node in np.intersect1d(corners[low], corners[high]).tolist():
+            sides = [cells.gains[c] / width if constant[c] else gains[node] for c in (low, high)]
+            nodes.append((node, node))
+            steps.append(np.abs(sides[0] - sides[1]).max())
+    return np.array(nodes, dtype=np.intp).reshape(-1, 2), np.array(steps)

@@ -31,6 +31,7 @@ from drillctrl.tables.interpolation import (
     place,
 )
 from drillctrl.tables.node import NodeDesign, NodeTask, check_node
+from drillctrl.tables.refining import carried_over, refined_grid
 from drillctrl.tables.remembering import find_design, keep_design
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FALLBACKS = ("off", "best")
+ABSCISSA_ERROR = "spectral_abscissa_error"
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -56,6 +58,8 @@ class GainTable:
         Gain vector at each node; u = K1 Y(t) + K2 Y(t − τ0) is added to θ''.
     spectral_abscissa : array, (q,)
         α with these gains, per unit of dimensionless time.
+    abscissa_error : array, (q,)
+        How far α may be off, as in `analyze`: more than rounding where roots are multiple.
     stable, certified : bool array, (q,)
         Whether the loop is stable, and whether the count of its roots agrees.
     best_abscissa : array, (q,)
@@ -76,6 +80,7 @@ class GainTable:
     structure: FeedbackStructure
     gains: FloatArray
     spectral_abscissa: FloatArray
+    abscissa_error: FloatArray
     stable: BoolArray
     certified: BoolArray
     best_abscissa: FloatArray
@@ -96,8 +101,8 @@ class GainTable:
 
     @property
     def jump(self) -> tuple[float, tuple[int, int] | None]:
-        """Largest change between neighbouring stable nodes; see `largest_jump`."""
-        return largest_jump(self.grid, self.structure, self.gains, self.stable)
+        """Largest change between neighbouring stable nodes or cells; see `largest_jump`."""
+        return largest_jump(self.grid, self.structure, self.gains, self.stable, self.cells)
 
     def gains_at(
         self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
@@ -126,6 +131,12 @@ class GainTable:
         where = place(self.grid, self.grid.locate(omega0, delta0, psi))
         return np.asarray(where.inside & (self.cells.mode[where.cell] != UNSAFE))
 
+    @property
+    def worst_abscissa(self) -> float | None:
+        """Largest α found in the cells that the table vouches for; None if there are none."""
+        vouched = self.cells.mode != UNSAFE
+        return float(self.cells.spectral_abscissa[vouched].max()) if vouched.any() else None
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
         jump, between = self.jump
@@ -146,6 +157,7 @@ class GainTable:
             "cells": {
                 name: int((self.cells.mode == mode).sum()) for mode, name in enumerate(CELL_NAMES)
             },
+            "worst_abscissa": self.worst_abscissa,
             "rows": [dict(zip(self.columns, row, strict=True)) for row in self.rows()],
         }
 
@@ -153,19 +165,20 @@ class GainTable:
     def columns(self) -> tuple[str, ...]:
         """Names of the first columns of a row, the same in every file."""
         names = ("omega0", "delta0", "psi", *self.structure.entry_names)
-        return (*names, "spectral_abscissa", "stable", "certified", "best_abscissa")
+        return (*names, "spectral_abscissa", "stable", "certified", "best_abscissa", ABSCISSA_ERROR)
 
     def rows(self) -> list[list[float | bool]]:
         """Return one row a node in the order of `columns`."""
         return [
-            [point.omega0, point.delta0, point.psi, *gains, alpha, stable, certified, best]
-            for point, gains, alpha, stable, certified, best in zip(
+            [point.omega0, point.delta0, point.psi, *gains, *rest]
+            for point, gains, *rest in zip(
                 self.grid.points,
                 self.entries.tolist(),
                 self.spectral_abscissa.tolist(),
                 self.stable.tolist(),
                 self.certified.tolist(),
                 self.best_abscissa.tolist(),
+                self.abscissa_error.tolist(),
                 strict=True,
             )
         ]
@@ -211,6 +224,9 @@ class GainTable:
             f"{int((self.cells.mode == mode).sum())} {name}" for mode, name in enumerate(CELL_NAMES)
         ]
         lines.append(f"  Cells         {', '.join(counts)} (searched, not proved)")
+        if self.worst_abscissa is not None:
+            worst = f"{self.worst_abscissa:.4g}"
+            lines.append(f"                worst α found where vouched for: {worst}")
         return "\n".join(lines)
 
     def plot(self) -> Figure:
@@ -231,6 +247,7 @@ def table(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     objective: Objective = EXACT,
     give_up: float = 0.0,
+    refine: int = 0,
     fallback: str = "off",
     seed: int = 0,
     executor: Executor | None = None,
@@ -252,6 +269,9 @@ def table(
     give_up : float
         0: the lowest α found at each node. Up to 0.9: the smoothest table found that keeps
         α ≤ (1 − give_up) times the best at every node.
+    refine : int
+        How often the spacing is halved, at most, where cells are not vouched for although a
+        node of theirs is stable; up to 6.
     fallback : {"off", "best"}
         What a node gets that nothing found stabilises: no control (fixed gains alone), or
         the best gains found. It is marked as not stable either way.
@@ -273,6 +293,7 @@ def table(
     chosen = preset_structure(structure) if isinstance(structure, str) else structure
     chosen = chosen.with_bounds(bounds or {})
     share = checked_number("give_up", give_up, 0.0, 0.9)
+    rounds = checked_integer("refine", refine, 0, 6)
     checked_integer("seed", seed, 0, 2**63 - 1)
     if share and not isinstance(objective, Exact):
         raise InputError("give_up", share, f"0 with objective {objective.name}")
@@ -300,28 +321,36 @@ def table(
                 keep_design(checkpoint, missing[design.index], design)
             yield design
 
-    designs = design_grid(grid, chosen, seed, remembered, objective)
-    best = np.array([design.spectral_abscissa for design in designs])
-    gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
-    with threadpool_limits(1, user_api="blas"):
-        gains = smooth_gains(grid, chosen, gains, best, share)
-    if fallback == "off":
-        gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
-    tasks = [NodeTask(i, point, chosen, seed, (gains[i],)) for i, point in enumerate(grid.points)]
-    checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
-    stable = np.array([check.stable for check in checks])
-    cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, stable)))
-    return GainTable(
-        grid,
-        chosen,
-        gains,
-        np.array([check.spectral_abscissa for check in checks]),
-        stable,
-        np.array([check.certified for check in checks]),
-        best,
-        share,
-        fallback,
-        seed,
-        cells,
-        repr(objective),
-    )
+    known: dict[int, NodeDesign] = {}
+    for _ in range(rounds + 1):
+        designs = design_grid(grid, chosen, seed, remembered, objective, known)
+        best = np.array([design.spectral_abscissa for design in designs])
+        gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
+        with threadpool_limits(1, user_api="blas"):
+            gains = smooth_gains(grid, chosen, gains, best, share)
+        if fallback == "off":
+            gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
+        tasks = [NodeTask(i, p, chosen, seed, (gains[i],)) for i, p in enumerate(grid.points)]
+        checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
+        stable = np.array([check.stable for check in checks])
+        cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, stable)))
+        result = GainTable(
+            grid,
+            chosen,
+            gains,
+            np.array([check.spectral_abscissa for check in checks]),
+            np.array([check.abscissa_error for check in checks]),
+            stable,
+            np.array([check.certified for check in checks]),
+            best,
+            share,
+            fallback,
+            seed,
+            cells,
+            repr(objective),
+        )
+        finer = refined_grid(grid, cells, stable)
+        if finer == grid:
+            break
+        grid, known = finer, carried_over(designs, grid, finer)
+    return result

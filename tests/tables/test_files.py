@@ -16,7 +16,8 @@ from drillctrl.tables.files import ENDINGS
 
 def assert_same(one, two):
     assert one.grid == two.grid
-    for name in ("gains", "spectral_abscissa", "stable", "certified", "best_abscissa"):
+    columns = ("spectral_abscissa", "abscissa_error", "stable", "certified", "best_abscissa")
+    for name in ("gains", *columns):
         assert np.array_equal(getattr(one, name), getattr(two, name)), name
     for name in ("mode", "spectral_abscissa", "gains"):
         assert np.array_equal(getattr(one.cells, name), getattr(two.cells, name)), name

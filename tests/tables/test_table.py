@@ -1,5 +1,6 @@
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from drillctrl import (
     table1,
 )
 from drillctrl.tables.grid import Axis
+from drillctrl.tables.interpolation import Cells
 
 
 def test_nodes_are_as_good_as_single_designs_and_agree_with_analyze(small):
@@ -123,7 +125,7 @@ def test_bad_axes(low, high, count):
 
 
 def test_bad_arguments(small):
-    for wrong in ({"give_up": 0.95}, {"fallback": "nearest"}, {"seed": -1}):
+    for wrong in ({"give_up": 0.95}, {"fallback": "nearest"}, {"seed": -1}, {"refine": 7}):
         with pytest.raises(InputError):
             table(small.grid, "case1", **wrong)
 
@@ -136,6 +138,90 @@ def test_figure_shows_gains_and_abscissa(on_rig):
     data = shown.collections[0].get_array()
     drawn = np.sort(np.ravel(data)).tolist()
     assert drawn == pytest.approx(np.sort(on_rig.spectral_abscissa).tolist())
+
+
+def titles_of(table):
+    figure = table.plot()
+    return [ax.get_title() for ax in figure.axes if ax.get_title()], figure
+
+
+def test_one_axis_is_drawn_as_lines_and_one_node_as_text(speeds):
+    titles, figure = titles_of(speeds)
+    assert titles == ["K1_1", "K2_1", "α"]
+    x, y = figure.axes[2].lines[0].get_data()
+    assert x.tolist() == list(speeds.grid.axes[0].values)
+    assert y.tolist() == speeds.spectral_abscissa.tolist()
+    # A constant gain is drawn over its cell, beside the ones that are interpolated.
+    middle = figure.axes[0].lines[2].get_data()[1]
+    assert middle.tolist() == [speeds.cells.gains[1, 0]] * 2
+    titles, figure = titles_of(table(dimensionless_grid(10.0, 1.75, 14.0), "p"))
+    assert titles == ["one node"]
+    assert "K1_1 = " in figure.axes[0].texts[0].get_text()
+
+
+def test_all_layers_of_three_axes_are_drawn_and_a_constant_gain_too():
+    axes = Axis("omega0", (3.0, 9.0, 10.0)), Axis("delta0", (1.0, 2.0, 3.0))
+    cube = table(
+        dimensionless_grid(*axes, Axis("psi", (14.0, 18.0))), "p", bounds={"K1_1": (-9.0, -8.9)}
+    )
+    cube = replace(cube, gains=np.full_like(cube.gains, -9.0))
+    titles, figure = titles_of(cube)
+    assert titles == ["K1_1 at psi 18", "α at psi 14", "α at psi 18"]
+    shown = [ax.collections[0].get_array() for ax in figure.axes[1:3]]
+    drawn = np.concatenate([np.ravel(values.T) for values in shown])
+    layers = cube.spectral_abscissa.reshape(cube.grid.shape)
+    assert drawn.tolist() == [*layers[..., 0].ravel(), *layers[..., 1].ravel()]
+
+
+@pytest.fixture
+def speeds():
+    """Four nodes along one axis; the gains of the middle cell are constant."""
+    found = table(dimensionless_grid(linear_axis("omega0", 8, 14, 4), 2.0, 14.0), "case1")
+    gains = np.zeros((3, 2))
+    gains[1] = found.gains[1] + (3.0, -1.0)
+    return replace(found, cells=Cells(np.array([0, 1, 0]), np.full(3, -0.1), gains))
+
+
+def test_the_largest_jump_may_be_at_the_border_of_a_cell(speeds):
+    jump, between = speeds.jump
+    steps = [speeds.cells.gains[1] - speeds.gains[i] for i in (1, 2)]
+    inside = np.abs([speeds.gains[1] - speeds.gains[0], speeds.gains[3] - speeds.gains[2]]).max()
+    assert jump == pytest.approx(max(inside, np.abs(steps).max()) / 20.0)
+    assert between in ((1, 1), (2, 2))
+    assert speeds.worst_abscissa == -0.1
+    # What lies on both sides of a cell does not follow on each other.
+    alone = replace(speeds, cells=Cells(np.ones(3, dtype=int), np.zeros(3), np.ones((3, 2))))
+    assert alone.jump[0] == 0.0
+
+
+def test_refining_vouches_for_more_and_keeps_the_nodes():
+    coarse = dimensionless_grid(linear_axis("omega0", 1, 9, 3), linear_axis("delta0", 1, 6, 2))
+    tables = [table(coarse, "p", bounds={"K1": (-20.0, 20.0)}, refine=r) for r in (0, 1, 2)]
+    rng = np.random.default_rng(3)
+    omega0, delta0 = rng.uniform(1, 9, 800), rng.uniform(1, 6, 800)
+    shares = []
+    for found in tables:
+        vouched = found.stable_at(omega0, delta0, 14.0)
+        shares.append(vouched.mean())
+        K1, _ = found.gains_at(omega0, delta0, 14.0)
+        alpha = spectral_abscissas(
+            found.grid.points[0],
+            {"omega0": omega0, "delta0": delta0},
+            found.structure,
+            K1.reshape(-1, 1),
+        )
+        assert (alpha[vouched] < 0.0).all()
+        assert set(coarse.points) <= set(found.grid.points)
+    assert shares[0] < shares[1] < shares[2]
+
+
+def test_the_error_of_the_spectral_abscissa_is_told():
+    # The best gains make a root of multiplicity five, which rounding splits.
+    found = table(dimensionless_grid(6.0, 9.7), "case2")
+    K1, K2 = found.gains_at(6.0, 9.7, 14.0)
+    told = analyze(found.grid.points[0], "case2", K1[0], K2[0]).loop
+    assert found.abscissa_error[0] == told.abscissa_error > 1e-4
+    assert (found.spectral_abscissa + found.abscissa_error < 0.0)[found.stable].all()
 
 
 def test_people_read_the_units_of_the_field(on_rig):
