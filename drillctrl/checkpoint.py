@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from drillctrl.errors import InputError
+from drillctrl.files import replacing
 
 
 class Checkpoint:
@@ -33,8 +34,8 @@ class Checkpoint:
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self._known: dict[str, dict[str, Any]] = {}
-        own = version("drillctrl")
-        header = json.dumps({"drillctrl checkpoint": own}).encode("ascii") + b"\n"
+        self._used: set[str] = set()
+        header = _header()
         try:
             self._file = self._path.open("a+b")
             self._file.seek(0)
@@ -42,7 +43,7 @@ class Checkpoint:
             # A kill may have cut the first line short.
             if not header.startswith(first):
                 self._file.close()
-                raise InputError("checkpoint", str(path), f"a checkpoint of drillctrl {own}")
+                raise InputError("checkpoint", str(path), f"a checkpoint of drillctrl {_own()}")
             if first != header:
                 self._file.truncate(0)
                 self._file.write(header)
@@ -65,6 +66,11 @@ class Checkpoint:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @property
+    def path(self) -> Path:
+        """Where the file is."""
+        return self._path
+
     def _refused(self, error: OSError) -> InputError:
         return InputError(
             "checkpoint", str(self._path), f"a file that can be written ({error.strerror})"
@@ -72,6 +78,8 @@ class Checkpoint:
 
     def find(self, key: str) -> dict[str, Any] | None:
         """Return the result of a task if it is known."""
+        if key in self._known:
+            self._used.add(key)
         return self._known.get(key)
 
     def keep(self, key: str, result: dict[str, Any]) -> None:
@@ -83,17 +91,33 @@ class Checkpoint:
             If the disk is full or the file is gone.
         """
         try:
-            line = json.dumps({"task": key, "result": result})
-            self._file.write(line.encode("ascii") + b"\n")
+            self._file.write(_line(key, result))
             self._file.flush()
             self._known[key] = result
+            self._used.add(key)
         except OSError as error:
             raise self._refused(error) from None
 
-    def remove(self) -> None:
-        """Close and delete the file: what it was for is done."""
+    def remove(self) -> int:
+        """Take out what was found or kept, which has served; without more the file is deleted.
+
+        Returns
+        -------
+        int
+            How many results of other runs the file still holds.
+        """
         self._file.close()
-        self._path.unlink(missing_ok=True)
+        others = {key: result for key, result in self._known.items() if key not in self._used}
+        if not others:
+            self._path.unlink(missing_ok=True)
+            return 0
+        lines = [_header(), *(_line(key, result) for key, result in others.items())]
+        try:
+            with replacing(self._path) as file:
+                file.writelines(lines)
+        except OSError as error:
+            raise self._refused(error) from None
+        return len(others)
 
     def close(self) -> None:
         """Close the file and leave it for the next run, unless there is nothing in it."""
@@ -104,6 +128,18 @@ class Checkpoint:
             self._file.close()
         if not self._known:
             self._path.unlink(missing_ok=True)
+
+
+def _own() -> str:
+    return version("drillctrl")
+
+
+def _header() -> bytes:
+    return json.dumps({"drillctrl checkpoint": _own()}).encode("ascii") + b"\n"
+
+
+def _line(key: str, result: dict[str, Any]) -> bytes:
+    return json.dumps({"task": key, "result": result}).encode("ascii") + b"\n"
 
 
 def _read_line(line: bytes) -> dict[str, Any] | None:

@@ -9,9 +9,10 @@ import click
 from drillctrl.cli.gains import read_gains
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+from drillctrl.cli.verb import Verb
 
 
-@click.command(name="analyze")
+@click.command(name="analyze", cls=Verb)
 @point_options
 @click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
 @click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")

@@ -19,6 +19,7 @@ from drillctrl.cli.output import (
     writing,
 )
 from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.verb import Verb
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def read_axis(option: str, text: str) -> tuple[str, object, object]:
     return name.strip(), limits[0], limits[1]
 
 
-@click.command(name="chart")
+@click.command(name="chart", cls=Verb)
 @point_options
 @click.option("--x", "x_axis", default="omega0=0.5:25", show_default=True, metavar="NAME=LOW:HIGH")
 @click.option("--y", "y_axis", default="delta0=0:15", show_default=True, metavar="NAME=LOW:HIGH")

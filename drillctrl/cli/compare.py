@@ -13,6 +13,7 @@ import click
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.verb import Verb
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 ENDINGS = (".html", ".csv", ".json")
 
 
-@click.command(name="compare")
+@click.command(name="compare", cls=Verb)
 @point_options
 @click.option(
     "--structures", default="p,case1,pd,case2", show_default=True, help="Presets to design for."

@@ -7,12 +7,18 @@ from typing import Any
 import click
 
 from drillctrl.cli.gains import read_bounds
-from drillctrl.cli.objective import objective_options, read_objective
+from drillctrl.cli.objective import (
+    objective_options,
+    read_objective,
+    read_requirements,
+    requirement_options,
+)
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+from drillctrl.cli.verb import Verb
 
 
-@click.command(name="design")
+@click.command(name="design", cls=Verb)
 @point_options
 @click.option(
     "--structure",
@@ -27,6 +33,7 @@ from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_out
     help="For K1, K2 or one gain such as K1_2; may be repeated.",
 )
 @objective_options
+@requirement_options
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
 @click.option(
     "--require-stable",
@@ -54,7 +61,7 @@ def design_command(
       drillctrl design --objective worst-case --psi-error 0.2 --min-decay 0.1
     """
     check_outputs(out, plot)
-    objective, requirements = read_objective(options)
+    objective, requirements = read_objective(options), read_requirements(options)
     where = read_point(options)
     from drillctrl.designing import design
 

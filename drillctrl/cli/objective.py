@@ -28,7 +28,7 @@ _REQUIREMENTS = {
 
 
 def objective_options(command: Command) -> Command:
-    """Add the options that say what is minimised and required."""
+    """Add the options that say what is minimised."""
     options = [
         click.option(
             "--objective",
@@ -43,6 +43,15 @@ def objective_options(command: Command) -> Command:
         click.option("--delta0-error", type=float, help="Relative (worst-case; default 0)."),
         click.option("--omega0-error", type=float, help="Relative (worst-case; default 0)."),
         click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def requirement_options(command: Command) -> Command:
+    """Add the options that say what is required."""
+    options = [
         click.option("--min-decay", type=float, help="Require α ≤ −this."),
         click.option("--min-radius", type=float, help="Require this stability radius."),
         click.option(
@@ -56,7 +65,16 @@ def objective_options(command: Command) -> Command:
     return command
 
 
-def read_objective(options: dict[str, Any]) -> tuple[Objective, Requirements]:
+def read_requirements(options: dict[str, Any]) -> Requirements:
+    """Take the options of `requirement_options` out of a mapping."""
+    from drillctrl.optimisation.objectives import Requirements
+
+    return Requirements(
+        **{parameter: options.pop(option) for option, parameter in _REQUIREMENTS.items()}
+    )
+
+
+def read_objective(options: dict[str, Any]) -> Objective:
     """Take the options of `objective_options` out of a mapping.
 
     Raises
@@ -64,13 +82,7 @@ def read_objective(options: dict[str, Any]) -> tuple[Objective, Requirements]:
     InputError
         If the objective is unknown, or an option belongs to another one.
     """
-    from drillctrl.optimisation.objectives import (
-        Exact,
-        Requirements,
-        Robust,
-        SemiDiscrete,
-        WorstCase,
-    )
+    from drillctrl.optimisation.objectives import Exact, Robust, SemiDiscrete, WorstCase
 
     kinds: dict[str, Callable[..., Objective]] = {
         "exact": Exact,
@@ -91,5 +103,4 @@ def read_objective(options: dict[str, Any]) -> tuple[Objective, Requirements]:
                 flag = "--" + option.replace("_", "-")
                 raise InputError(flag, value, f"left out unless --objective is {owner}")
             chosen[parameter] = value
-    required = {parameter: options.pop(option) for option, parameter in _REQUIREMENTS.items()}
-    return kinds[name](**chosen), Requirements(**required)
+    return kinds[name](**chosen)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +20,16 @@ def json_text(fields: dict[str, Any]) -> str:
 
 
 def check_folder(parameter: str, path: str | None) -> None:
-    """Refuse a file in a folder that does not exist, before any work is done."""
-    if path is not None and not Path(path).absolute().parent.is_dir():
+    """Refuse a file that cannot be written where it is to be, before any work is done."""
+    if path is None:
+        return
+    folder = Path(path).absolute().parent
+    if not folder.is_dir():
         raise InputError(parameter, path, "in a folder that exists")
+    if not os.access(folder, os.W_OK):
+        raise InputError(parameter, path, "in a folder that can be written to")
+    if Path(path).is_dir():
+        raise InputError(parameter, path, "a file, not a folder")
 
 
 def check_figure(plot: str | None) -> None:

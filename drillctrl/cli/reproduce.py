@@ -7,8 +7,10 @@ import textwrap
 
 import click
 
+from drillctrl.cli.verb import Verb
 
-@click.command(name="reproduce")
+
+@click.command(name="reproduce", cls=Verb)
 @click.argument("figures", nargs=-1, metavar="[FIG…|all]")
 @click.option(
     "--out",

@@ -15,6 +15,7 @@ from drillctrl.cli.running import (
     read_duration,
     read_scenario,
 )
+from drillctrl.cli.verb import Verb
 from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
 
 
-@click.command(name="simulate")
+@click.command(name="simulate", cls=Verb)
 @point_options
 @controller_options
 @click.option("--model", default="nonlinear", show_default=True, help="nonlinear or linear.")

@@ -113,15 +113,17 @@ def _columns(table: GainTable) -> tuple[dict[str, FloatArray], dict[str, str]]:
         columns["delay_s"] = np.array([p.delay for p in table.grid.points]) * rig.time_scale
         units["delay_s"] = "s"
         for name, (factor, unit), values in zip(
-            structure.entry_names, rig_gain_units(table) or [], table.entries.T, strict=False
+            structure.entry_names,
+            rig_gain_units(structure, rig) or [],
+            table.entries.T,
+            strict=False,
         ):
             columns[f"{name}_rig"], units[f"{name}_rig"] = factor * values, unit
     return columns, units
 
 
-def rig_gain_units(table: GainTable) -> list[tuple[float, str]] | None:
+def rig_gain_units(structure: FeedbackStructure, rig: Rig | None) -> list[tuple[float, str]] | None:
     """Return factor and SI unit of each entry of (K1, K2); None without rig units for them."""
-    structure, rig = table.structure, table.grid.rig
     if rig is None or structure.inputs != ("torque",):
         return None
     if not set(structure.outputs) <= {"theta", "dtheta"}:

@@ -59,8 +59,7 @@ def export_c(
         If a value is out of range, the structure drives more than one input, it has no gains
         in rig units over a grid in rig units, or there is a ``NAME.h`` of someone else's.
     """
-    if real not in REALS:
-        raise InputError("real", real, f"one of {', '.join(REALS)}")
+    check_real(real)
     controller = sampled_controller(table, name, period, limit, ramp)
     header = Path(folder) / f"{name}.h"
     source = Path(folder) / f"{name}.c"
@@ -74,13 +73,25 @@ def export_c(
         "suffix": "F" if real == "float" else "",
         "tables": _tables(controller, name, real),
     }
-    if header.exists() and _MARK not in header.read_bytes():
-        raise InputError("name", name, f"another one, or {header} out of the way: it is not ours")
+    check_c_header(header)
     # If one cannot be moved to its place, the stamp keeps the pair from being compiled.
     with replacing(header) as first, replacing(source) as second:
         first.write(filled(_HEADER, words).encode("ascii"))
         second.write(filled(_SOURCE, words).encode("ascii"))
     return header, source
+
+
+def check_real(real: str) -> None:
+    """Raise `InputError` unless a type of the arithmetic is known."""
+    if real not in REALS:
+        raise InputError("real", real, f"one of {', '.join(REALS)}")
+
+
+def check_c_header(path: str | Path) -> None:
+    """Raise `InputError` if a header would take the place of someone else's."""
+    header = Path(path)
+    if header.exists() and _MARK not in header.read_bytes():
+        raise InputError("name", header.stem, f"another one, or {header} moved: it is not ours")
 
 
 def _number(value: float, real: str) -> str:

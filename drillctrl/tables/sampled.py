@@ -8,13 +8,15 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from drillctrl.errors import InputError, checked_integer, checked_number
+from drillctrl.feedback import FeedbackStructure
 from drillctrl.plant import STATE_NAMES
 from drillctrl.tables.document import rig_gain_units, to_document
-from drillctrl.tables.grid import DIMENSIONLESS
+from drillctrl.tables.grid import DIMENSIONLESS, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
 from drillctrl.tables.table import GainTable
 
@@ -60,10 +62,74 @@ class SampledController:
         return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
 
 
+class Sampling(NamedTuple):
+    """Checked settings of a controller, and what follows from them.
+
+    Attributes
+    ----------
+    period, limit : float
+        As for `export_c`.
+    depth : int
+        Samples that the ring holds: the longest delay, what is in between two, and the newest.
+    ramp : int
+        Samples of the switch-on.
+    """
+
+    period: float
+    limit: float
+    depth: int
+    ramp: int
+
+
+def checked_sampling(
+    grid: Grid,
+    structure: FeedbackStructure,
+    name: str,
+    period: float,
+    limit: float,
+    ramp: int | None,
+) -> Sampling:
+    """Check what a controller is to be, for which no gains need be known.
+
+    Parameters
+    ----------
+    grid, structure : Grid, FeedbackStructure
+        Of the table.
+    name, period, limit, ramp
+        As for `export_c`.
+
+    Raises
+    ------
+    InputError
+        As `export_c` does.
+    """
+    step = checked_number("period", period, 0.0, 1e6, open_low=True)
+    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+        raise InputError("name", name, "an identifier of at most 31 characters, such as gain_table")
+    # The words go into comments, which other names might end.
+    if not set(structure.outputs) <= set(STATE_NAMES):
+        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(STATE_NAMES)}")
+    if len(structure.inputs) != 1:
+        raise InputError("structure", structure.name, "one with a single input")
+    if grid.rig is not None and rig_gain_units(structure, grid.rig) is None:
+        raise InputError("structure", structure.name, "torque fed back from θ and θ'")
+    longest = max(point.delay for point in grid.points)
+    longest *= grid.rig.time_scale if grid.rig is not None else 1.0
+    # A period that is tiny makes a number of samples that is none.
+    if not longest / step < _DEEPEST:
+        least = longest / _DEEPEST
+        raise InputError("period", step, f"above {least:g}, for a delay of {longest:g}")
+    whole = int(longest / step)
+    # By default as long as the delayed outputs take to come in.
+    count = whole if ramp is None else checked_integer("ramp", ramp, 0, 10**9)
+    return Sampling(step, bound, whole + 3, count)
+
+
 def sampled_controller(
     table: GainTable, name: str, period: float, limit: float, ramp: int | None
 ) -> SampledController:
-    """Check what a controller is to be, and collect what its source says.
+    """Collect what the source of a controller says.
 
     Parameters
     ----------
@@ -75,26 +141,9 @@ def sampled_controller(
     InputError
         As `export_c` does.
     """
-    step = checked_number("period", period, 0.0, 1e6, open_low=True)
-    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise InputError("name", name, "an identifier of at most 31 characters")
-    structure, rig, factors = table.structure, table.grid.rig, rig_gain_units(table)
-    # The words go into comments, which other names might end.
-    if not set(structure.outputs) <= set(STATE_NAMES):
-        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(STATE_NAMES)}")
-    if len(structure.inputs) != 1:
-        raise InputError("structure", structure.name, "one with a single input")
-    if rig is not None and factors is None:
-        raise InputError("structure", structure.name, "torque fed back from θ and θ'")
-    longest = max(point.delay for point in table.grid.points)
-    longest *= rig.time_scale if rig is not None else 1.0
-    depth = int(longest / step) + 3
-    if depth > _DEEPEST:
-        least = longest / _DEEPEST
-        raise InputError("period", step, f"at least {least:g}, for a delay of {longest:g}")
-    # By default as long as the delayed outputs take to come in.
-    count = depth - 3 if ramp is None else checked_integer("ramp", ramp, 0, 10**9)
+    grid, structure, rig = table.grid, table.structure, table.grid.rig
+    step, bound, depth, count = checked_sampling(grid, structure, name, period, limit, ramp)
+    factors = rig_gain_units(structure, rig)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
     constant = mode == CONSTANT

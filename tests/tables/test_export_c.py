@@ -145,7 +145,7 @@ def test_a_header_of_another_table_is_not_compiled(small, tmp_path):
 
 def test_a_header_of_someone_else_is_left_alone(small, tmp_path):
     (tmp_path / "gain_table.h").write_text("/* mine */")
-    with pytest.raises(InputError, match="out of the way"):
+    with pytest.raises(InputError, match="it is not ours"):
         export_c(small, tmp_path, period=PERIOD, limit=LIMIT)
     assert (tmp_path / "gain_table.h").read_text() == "/* mine */"
     assert len(list(tmp_path.iterdir())) == 1

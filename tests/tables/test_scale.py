@@ -41,7 +41,11 @@ def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
     fresh = []
     table(GRID, "case1", seed=1, checkpoint=third, progress=lambda *a: fresh.append(a))
     assert sum(stage == "design" for stage, _, _ in fresh) >= 9
-    third.remove()
+    # What is done is taken out; the file goes with the last of it.
+    assert third.remove() == len(lines) - 1
+    fourth = Checkpoint(path)
+    assert same(table(GRID, "case1", checkpoint=fourth), small)
+    assert fourth.remove() == 0
     assert not path.exists()
 
 

@@ -1,0 +1,126 @@
+"""Options that say over which operating points a table goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from drillctrl.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.tables.grid import Axis, Grid
+    from drillctrl.units import Dimension
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_GROUPS = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades")
+_RIG = ("rig", "speed", "rop", "wob", "rock_strength")
+_SPAN = "LOW:HIGH:COUNT"
+
+
+def grid_options(command: Command) -> Command:
+    """Add the options that say over which operating points a table goes."""
+    with_unit = f"'{_SPAN} UNIT'"
+    options = [
+        click.option("--omega0", metavar=_SPAN, help="Rotary speed ω0, or one number."),
+        click.option("--delta0", metavar=_SPAN, help="Depth of cut δ0, or one number."),
+        click.option("--psi", metavar=_SPAN, help="Cutting coefficient ψ (default 14)."),
+        click.option("--eta", type=float, help="Frequency ratio η (default 1.6)."),
+        click.option("--xi", type=float, help="Axial damping ratio ξ (default 0.02)."),
+        click.option("--kappa", type=float, help="Torsional damping ratio κ (default 0.02)."),
+        click.option("--damping", type=float, help="Sets ξ and κ together."),
+        click.option("--blades", type=float, help="Number of blades n (default 4)."),
+        click.option("--rig", help="Preset (table1) or TOML file, instead of the above."),
+        click.option("--speed", metavar=with_unit, help="Such as '90:180:10 rpm'."),
+        click.option("--rop", metavar=with_unit, help="Such as '5:30:6 m/h'."),
+        click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
+        click.option("--rock-strength", metavar=with_unit, help="Such as '40:80:5 MPa'."),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def read_grid(options: dict[str, Any]) -> Grid:
+    """Return the grid that the options name.
+
+    Raises
+    ------
+    InputError
+        If dimensionless and rig options are mixed, or one is missing or wrong.
+    """
+    from drillctrl.tables.grid import dimensionless_grid
+
+    given = {name: value for name, value in options.items() if value is not None}
+    groups = {k: given[k] for k in _GROUPS if k in given}
+    rig = {k: given[k] for k in _RIG if k in given}
+    if groups and rig:
+        first = next(iter(groups))
+        raise InputError(f"--{first}", groups[first], "left out where a rig is given")
+    if rig:
+        return _rig_grid(rig)
+    for name in ("omega0", "delta0"):
+        if name not in groups:
+            raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
+    from drillctrl.operating_point import OperatingPoint
+
+    damping = groups.pop("damping", None)
+    if damping is not None:
+        for name in ("xi", "kappa"):
+            if name in groups:
+                raise InputError(f"--{name}", groups[name], "left out where --damping is given")
+            groups[name] = damping
+    axes = {name: _axis(name, str(groups.pop(name, "14")), None) for name in _GROUPS[:3]}
+    corner = {name: axis.values[0] for name, axis in axes.items()}
+    return dimensionless_grid(**axes, reference=OperatingPoint(**{**corner, **groups}))
+
+
+def _rig_grid(given: dict[str, str]) -> Grid:
+    from drillctrl import units
+    from drillctrl.rig import load_rig
+    from drillctrl.tables.grid import rig_grid
+
+    for name in ("rig", "speed"):
+        if name not in given:
+            raise InputError(f"--{name}", "(missing)", "given, for a grid in rig units")
+    if "rop" in given and "wob" in given:
+        raise InputError("--wob", given["wob"], "left out where --rop is given")
+    if "rop" not in given and "wob" not in given:
+        raise InputError("--rop", "(missing)", "given, such as '5:30:6 m/h', or else --wob")
+    further = {
+        "rop": ("penetration_rate", units.SPEED),
+        "wob": ("weight_on_bit", units.FORCE),
+        "rock_strength": ("rock_strength", units.STRESS),
+    }
+    axes: dict[str, Any] = {
+        name: _axis(option, given[option], dimension, name)
+        for option, (name, dimension) in further.items()
+        if option in given
+    }
+    speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
+    return rig_grid(load_rig(given["rig"]), speed, **axes)
+
+
+def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:
+    """Read ``LOW:HIGH:COUNT`` or one number, with a unit behind it where there is one."""
+    from drillctrl import units
+    from drillctrl.tables.grid import linear_axis
+
+    flag = f"--{option.replace('_', '-')}"
+    numbers, _, unit = text.strip().partition(" ")
+    parts = numbers.split(":")
+    example = "4:24:21" if dimension is None else f"such as '60:180:13 {dimension.unit}'"
+    try:
+        if len(parts) not in (1, 3) or (dimension is None and unit):
+            raise ValueError
+        count = int(parts[2]) if len(parts) == 3 else 1
+        ends = [float(part) for part in (parts[:2] if len(parts) == 3 else parts * 2)]
+    except ValueError:
+        raise InputError(flag, text, f"{_SPAN}, {example}") from None
+    if dimension is not None:
+        ends = [units.to_si(flag, f"{end!r} {unit}", dimension) for end in ends]
+        if min(ends) < 0.0 or (min(ends) == 0.0 and option != "rop"):
+            raise InputError(flag, text, "of positive values")
+    return linear_axis(name or option, ends[0], ends[1], count)
