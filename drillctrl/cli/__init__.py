@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 
 import click
@@ -44,6 +45,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its status."""
     try:
         status = cli.main(arguments, prog_name="drillctrl", standalone_mode=False)
+        sys.stdout.flush()
     except InputError as error:
         _fail(str(error))
     except click.UsageError as error:
@@ -51,6 +53,14 @@ def main(arguments: list[str] | None = None) -> None:
     except click.exceptions.Abort:
         click.echo("drillctrl: interrupted", err=True)
         sys.exit(130)
+    except OSError as error:
+        # Nothing else is left to a caller: files are written with messages of their own.
+        with contextlib.suppress(OSError):
+            sys.stdout.close()
+        # Whoever stops reading, as `head` does, has had enough.
+        if not isinstance(error, BrokenPipeError):
+            _fail(f"standard output = {error.strerror}: must be something that can be written to")
+        sys.exit(1)
     sys.exit(status if isinstance(status, int) else 0)
 
 

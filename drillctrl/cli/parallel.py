@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import logging
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.errors import InputError
@@ -16,18 +23,59 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def open_executor(workers: int, scheduler: str | None) -> Iterator[Executor | None]:
-    """Yield what works side by side: a cluster, processes, or nothing."""
+    """Yield what works side by side: a cluster, processes, or nothing.
+
+    Raises
+    ------
+    InputError
+        If the scheduler does not answer, or workers or scheduler are lost on the way.
+    """
     if scheduler is not None:
         with _cluster(scheduler) as executor:
             yield executor
     elif workers == 1:
         yield None
     else:
-        import multiprocessing
+        with _processes(workers) as executor:
+            yield executor
 
-        # A forked child would inherit the threads of the linear algebra.
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-            yield pool
+
+@contextlib.contextmanager
+def _processes(workers: int) -> Iterator[Executor]:
+    # A forked child would inherit the threads of the linear algebra.
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _follow_parent)
+    usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        # Each task that finds none idle starts a process, which inherits that an interrupt is
+        # not for it.
+        for _ in range(workers):
+            pool.submit(int)
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    try:
+        yield pool
+    except BrokenProcessPool:
+        wanted = "processes that are not killed; the same command goes on where this one stopped"
+        raise InputError("--workers", workers, wanted) from None
+    except BaseException:
+        # Nobody waits for what they are at.
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _follow_parent() -> None:
+    """Let a process end when the one that started it has ended, however it did."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextlib.contextmanager
@@ -38,8 +86,12 @@ def _cluster(address: str) -> Iterator[Executor]:
         raise InputError(
             "--scheduler", address, "used with Dask: pip install 'drillctrl[cluster]'"
         ) from None
+    # What it logs on the way is what is raised in the end.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         from distributed.comm.addressing import get_address_host_port
+        from distributed.comm.core import CommClosedError
 
         # A client given what is no address tries to close what it has not opened.
         get_address_host_port(address)
@@ -47,8 +99,15 @@ def _cluster(address: str) -> Iterator[Executor]:
         client = make(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError("--scheduler", address, f"a scheduler that answers ({error})") from None
-    with client, client.get_executor(pure=False) as executor:
+    executor = client.get_executor(pure=False)
+    try:
         yield executor
+    except (CancelledError, TimeoutError, CommClosedError):
+        wanted = "a scheduler that stays; the same command goes on where this one stopped"
+        raise InputError("--scheduler", address, wanted) from None
+    finally:
+        executor.shutdown(wait=False)
+        client.close(timeout=2)
 
 
 @contextlib.contextmanager

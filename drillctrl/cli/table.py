@@ -62,8 +62,8 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--from", "source", type=click.Path(), metavar="FILE", help="A saved table instead of a design."
 )
-@click.option("--period", type=float, help="Sampling period of a .c or .st controller.")
-@click.option("--limit", type=float, help="Largest |u| of a .c or .st controller.")
+@click.option("--period", type=float, help="Of a .c or .st controller; s with a rig.")
+@click.option("--limit", type=float, help="Largest |u| of a .c or .st controller; N·m with a rig.")
 @click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
 @click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
 @click.option("--require-stable", is_flag=True, help="Exit with 3 if a node is not stable.")

@@ -60,3 +60,69 @@ def test_bad_input_is_one_line(capsys, arguments):
     assert (status, out) == (2, "")
     assert err.startswith("drillctrl: ")
     assert err.count("\n") == 1
+
+
+NODES = ("--omega0", "9:11:2", "--delta0", "1:2:2")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--out", "my-gains.c", "--period", 1, "--limit", 3), "--out = my-gains"),
+        (("--out", "g.c", "--period", 1), "--limit = (missing)"),
+        (("--out", "g.c", "--period", -1, "--limit", 3), "--period = -1.0"),
+        (("--out", "g.c", "--period", 1e-9, "--limit", 3), "--period = 1e-09"),
+        (("--out", "g.c", "--period", 1, "--limit", 3, "--real", "half"), "--real = half"),
+        (("--out", "g.st", "--period", 1, "--limit", 3, "--real", "float"), "--real = float"),
+        (("--out", "g.st", "--period", 1, "--limit", 3, "--ramp", -1), "--ramp = -1"),
+        (("--out", "g.csv", "--period", 1), "--period = 1.0"),
+        (("--out", "taken.csv"), "--out = taken.csv: must be a file, not a folder"),
+        (("--out", "mine.c", "--period", 1, "--limit", 3), "mine.h moved"),
+        (("--workers", 2, "--scheduler", "tcp://127.0.0.1:1"), "--workers = 2"),
+        (("--objective", "worst-case", "--smooth", 3), "--smooth = 3.0"),
+        (("--fallback", "hope"), "--fallback = hope"),
+        (("--refine", 9), "--refine = 9"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_the_design(
+    capsys, tmp_path, monkeypatch, arguments, said
+):
+    def design(*_, **__):
+        raise AssertionError("designed")
+
+    monkeypatch.setattr("drillctrl.tables.table.design_grid", design)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken.csv").mkdir()
+    (tmp_path / "mine.h").write_text("/* mine */")
+    status, out, err = run(capsys, "table", *NODES, *arguments)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"taken.csv", "mine.h"}
+
+
+def test_a_saved_table_is_drawn_and_exported(capsys, tmp_path):
+    saved, again = tmp_path / "gains.json", tmp_path / "again.json"
+    _, said, _ = run(capsys, "table", *NODES, "--refine", 1, "--out", saved)
+    status, text, err = run(
+        capsys, "table", "--from", saved, "--out", again, "--plot", tmp_path / "gains.png"
+    )
+    assert (status, text, err) == (0, said, "")
+    assert again.read_bytes() == saved.read_bytes()
+    direct, later = (["--out", tmp_path / f"{n}.st", "--period", 0.01, "--limit", 5] for n in "ab")
+    run(capsys, "table", *NODES, *direct, "--ramp", 7)
+    run(capsys, "table", "--from", saved, *later, "--ramp", 7)
+    assert (tmp_path / "a.st").read_bytes() == (tmp_path / "b.st").read_bytes()
+    status, _, err = run(capsys, "table", "--from", saved, "--structure", "pd")
+    assert (status, err.split(":")[1]) == (2, " --structure = pd")
+    status, _, err = run(capsys, "table", "--from", tmp_path / "none.csv")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "--from = " in err
+
+
+def test_options_of_the_arithmetic_and_the_ramp_reach_the_controller(capsys, tmp_path):
+    out = tmp_path / "g.c"
+    options = ("--period", 0.01, "--limit", 5, "--real", "float", "--ramp", 12)
+    assert run(capsys, "table", *NODES, "--out", out, *options)[0] == 0
+    assert "typedef float g_real" in (tmp_path / "g.h").read_text()
+    assert "#define RAMP 12\n" in out.read_text()

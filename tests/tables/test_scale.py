@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_tab
 from drillctrl.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
+QUICK = ["table", "--omega0", "6:22:9", "--delta0", "1:11:5", "--out"]
 SLOW = ["table", "--omega0", "6:22:5", "--delta0", "1:11:3", "--structure", "case2", "--out"]
 
 
@@ -77,7 +79,7 @@ def test_a_file_that_is_no_checkpoint_is_refused_and_left_alone(content, tmp_pat
 
 def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(tmp_path):
     whole, broken = tmp_path / "whole.csv", tmp_path / "broken.csv"
-    program = [sys.executable, "-m", "drillctrl", *SLOW]
+    program = [sys.executable, "-m", "drillctrl", *QUICK]
     subprocess.run([*program, str(whole)], check=True, capture_output=True)
     checkpoint = tmp_path / "broken.csv.checkpoint"
     run = subprocess.Popen([*program, str(broken)], stdout=subprocess.DEVNULL)
@@ -178,3 +180,71 @@ def test_the_result_does_not_depend_on_the_order_of_nodes(small):
 
     assert same(table(GRID, "case1", executor=Backwards()), small)
     assert np.isfinite(small.gains).all()
+
+
+@pytest.fixture
+def two_workers(tmp_path):
+    """A command with two processes, and the processes, once both are at work."""
+    program = [sys.executable, "-m", "drillctrl", *SLOW, "gains.csv", "--workers", "2"]
+    run = subprocess.Popen(
+        program, cwd=tmp_path, start_new_session=True, stdout=-1, stderr=-1, text=True
+    )
+    children = Path(f"/proc/{run.pid}/task/{run.pid}/children")
+    checkpoint = tmp_path / "gains.csv.checkpoint"
+    while not checkpoint.exists() or checkpoint.read_bytes().count(b"\n") < 3:
+        assert run.poll() is None
+        time.sleep(0.02)
+    # The other child watches over what they share.
+    pids = [int(pid) for pid in children.read_text().split()]
+    lines = {pid: Path(f"/proc/{pid}/cmdline").read_text() for pid in pids}
+    yield run, [pid for pid, line in lines.items() if "spawn_main" in line]
+    run.kill()
+    run.communicate()
+
+
+on_linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="no /proc")
+
+
+def gone(pid):
+    end = time.monotonic() + 20.0
+    while Path(f"/proc/{pid}").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    return not Path(f"/proc/{pid}").exists()
+
+
+@on_linux
+def test_a_worker_that_is_killed_is_one_line(two_workers, tmp_path):
+    run, pids = two_workers
+    assert len(pids) == 2
+    os.kill(pids[0], signal.SIGKILL)
+    out, err = run.communicate(timeout=60)
+    assert (run.returncode, out) == (2, "")
+    assert err.startswith("drillctrl: --workers = 2")
+    assert err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["gains.csv.checkpoint"]
+
+
+@on_linux
+def test_workers_end_with_the_command_and_an_interrupt_is_one_line(two_workers):
+    run, pids = two_workers
+    os.killpg(run.pid, signal.SIGINT)
+    out, err = run.communicate(timeout=60)
+    assert (run.returncode, out, err.strip()) == (130, "", "drillctrl: interrupted")
+    assert all(gone(pid) for pid in pids)
+
+
+@on_linux
+def test_workers_end_when_the_command_is_killed(two_workers):
+    run, pids = two_workers
+    run.kill()
+    assert all(gone(pid) for pid in pids)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_standard_output_without_room_is_one_line():
+    program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9", "--delta0", "1"]
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(program, stdout=full, stderr=-1, text=True, check=False)
+    assert run.returncode == 2
+    assert run.stderr.startswith("drillctrl: standard output = No space left")
+    assert run.stderr.count("\n") == 1
