@@ -80,4 +80,4 @@ def test_the_command(capsys, tmp_path):
         cli.main(["reproduce", "equations", "--out", str(tmp_path / "file" / "x")])
     captured = capsys.readouterr()
     assert stop.value.code == 2
-    assert captured.err.startswith("drillctrl: out = ")
+    assert captured.err.startswith("drillctrl: --out = ")

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from drillctrl import (
     analyze,
     dimensionless_grid,
     linear_axis,
+    scheduled_controller,
     simulate,
     table,
 )
@@ -110,3 +112,51 @@ def test_gains_may_bring_a_delay_of_their_own():
     ):
         with pytest.raises(InputError, match="schedule"):
             Controller("case1", [-3.0], [3.0], **wrong)
+
+
+def python_control_command(found, point, scenario, run, period, ahead=lambda times: 0.0):
+    """Return what the python-control system commands for what a run measured, and did command.
+
+    ``ahead`` is what the top end has turned beyond what it did at the start.
+    """
+    times = np.arange(int(run.times[-1] / period)) * period
+    places = course(point, scenario, times + 2e-9)
+    measured = [run.at(times).theta - ahead(times)]
+    if len(found.structure.outputs) == 2:
+        measured.append(run.at(times).dtheta - (places[:, 0] - point.omega0))
+    system = scheduled_controller(found.structure, found.gains_at, 4, 5.0, period, limit=3.0)
+    response = control.input_output_response(system, times, np.vstack([*measured, places.T]))
+    # The first sample is taken before a kick.
+    later = times > 1.5 * point.delay
+    return times[later], np.ravel(response.outputs)[later], run.at(times + period / 2).torque[later]
+
+
+def test_the_same_table_in_python_control_through_a_formation_change(rocks):
+    period = START.delay / 16
+    harder = Scenario(initial={"dtheta": 1.0}, changes=(Change(8.0, psi=24.0),))
+    ours = scheduled(rocks, START, harder, period=period, limit=3.0)
+    run = simulate(START, ours, scenario=harder, duration=16.0)
+    times, theirs, held = python_control_command(rocks, START, harder, run, period)
+    assert np.abs(theirs - held).max() < 1e-9
+    # Other gains are used after the change, and they matter.
+    kept = scheduled(rocks, START, Scenario(), period=period, limit=3.0)
+    other = simulate(START, kept, scenario=harder, duration=16.0)
+    assert np.abs(other.at(times).theta - run.at(times).theta).max() > 1e-3
+
+
+def test_the_same_table_in_python_control_through_a_change_of_speed(speeds):
+    point = OperatingPoint(6.0, 1.0, 14.0)
+    period = point.delay / 32
+    faster = Scenario(initial={"dtheta": 0.1}, changes=(Change(8.0, 4.0, omega0=12.0),))
+    ours = scheduled(speeds, point, faster, period=period, limit=3.0)
+    run = simulate(point, ours, scenario=faster, duration=20.0)
+
+    def ahead(times):
+        ramp = np.clip(times - 8.0, 0.0, 4.0)
+        return 6.0 * ramp**2 / 8.0 + 6.0 * np.maximum(times - 12.0, 0.0)
+
+    times, theirs, held = python_control_command(speeds, point, faster, run, period, ahead)
+    # In the ramp one looks up twice in a unit of time, the other at each sample.
+    calm = (times < 8.0) | (times > 12.0 + point.delay)
+    assert np.abs(theirs - held)[calm].max() < 1e-9
+    assert np.abs(held).max() > 1.0
