@@ -27,6 +27,8 @@ _MOST_KNOWN = 4
 _ONE_BASIN = 0.1
 # Excess of α over what the neighbours suggest, relative and absolute, that is looked into.
 _STANDS_OUT = (0.02, 0.01)
+# Relative excess of a node with other gains than a neighbour's that is looked into from there.
+_BENDS = 0.002
 
 
 def design_grid(
@@ -203,11 +205,14 @@ def _restarts(
     )
     here, there = own[pairs[:, 0]], own[pairs[:, 1]]
     promise = borrowed < here - 1e-6
-    # A neighbour that does much better by far other gains may sit in a better basin.
+    # A neighbour that does much better by far other gains may sit in a better basin, and so may
+    # any with other gains where α stands out a little.
     width = structure.upper - structure.lower
     apart = np.abs((gains[pairs[:, 0]] - gains[pairs[:, 1]]) / width).max(axis=1)
     apart = apart > _ONE_BASIN
+    bend = excess(own.reshape(grid.shape)).ravel()[pairs[:, 0]]
     promise |= apart & (there < here - 0.02 * np.abs(here))
+    promise |= apart & (bend > _BENDS * np.abs(here))
     tasks = []
     for index in np.unique(pairs[promise, 0]).tolist():
         better = pairs[promise & (pairs[:, 0] == index), 1][:_MOST_KNOWN].tolist()

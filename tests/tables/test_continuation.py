@@ -28,6 +28,24 @@ def test_a_node_that_stands_out_is_searched_over_the_whole_box_and_once():
     assert sorted(task for task in asked if not task[1]) == sorted([*coarse, (8, 0)])
 
 
+def test_a_node_with_other_gains_that_stands_out_a_little_is_begun_at_its_neighbours():
+    asked = []
+
+    def run(work, tasks):
+        for task in tasks:
+            # The first time, node 12 ends a little too high, in a basin of its own.
+            first = task.index == 12 and 12 not in asked
+            asked.append(task.index)
+            gains = np.full(2, 5.0 if first else 1.0)
+            yield NodeDesign(task.index, gains, -0.995 if first else -1.0, 0.0, ())
+
+    found = design_grid(GRID, preset_structure("case1"), 0, run)
+    assert [node.spectral_abscissa for node in found] == [-1.0] * 25
+    # The other way round its gains are tried beside it, in vain.
+    assert sorted(set(asked)) == list(range(25))
+    assert asked.count(12) == 2
+
+
 def test_a_descent_leaves_the_bounds_that_its_neighbours_gains_lie_on():
     # A neighbour's best p1 lies on its bound, the best one here does not.
     point = OperatingPoint(6.0, 61 / 7, 14.0)
