@@ -186,8 +186,14 @@ def test_the_result_does_not_depend_on_the_order_of_nodes(small):
 def two_workers(tmp_path):
     """A command with two processes, and the processes, once both are at work."""
     program = [sys.executable, "-m", "drillctrl", *SLOW, "gains.csv", "--workers", "2"]
+
+    # Whoever runs the tests in the background has interrupts ignored.
+    def listen():
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     run = subprocess.Popen(
-        program, cwd=tmp_path, start_new_session=True, stdout=-1, stderr=-1, text=True
+        program, cwd=tmp_path, start_new_session=True, preexec_fn=listen, **pipes
     )
     children = Path(f"/proc/{run.pid}/task/{run.pid}/children")
     checkpoint = tmp_path / "gains.csv.checkpoint"
@@ -244,7 +250,7 @@ def test_workers_end_when_the_command_is_killed(two_workers):
 def test_standard_output_without_room_is_one_line():
     program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9", "--delta0", "1"]
     with open("/dev/full", "w") as full:
-        run = subprocess.run(program, stdout=full, stderr=-1, text=True, check=False)
+        run = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 2
     assert run.stderr.startswith("drillctrl: standard output = No space left")
     assert run.stderr.count("\n") == 1
