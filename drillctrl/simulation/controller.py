@@ -70,8 +70,10 @@ class Controller:
         Standard deviation by state name of the white noise added to each sample.
     seed : int
         Of the noise.
-    schedule : tuple of ScheduleEntry, or of tuples like it
-        Later gains; times must rise.
+    schedule : tuple of (time, K1, K2) or (time, K1, K2, delay)
+        Later gains; times must rise. The delay is how long ago the delayed outputs are from
+        then on; without one it is τ0 of the starting point, which is wrong where the rotary
+        speed has changed.
 
     Raises
     ------
