@@ -194,7 +194,7 @@ def _read_mat(path: Path) -> Document:
     while place < len(content):
         (kind, matrix), place = _mat_element(content, place)
         if kind != _MAT_MATRIX:
-            raise ValueError("compressed, or no matrix; MATLAB writes others with save -v6")
+            raise ValueError("not written by drillctrl: compressed, or no matrix")
         name, number, data = _mat_array(matrix)
         if name in arrays:
             raise ValueError(f"{name[:60]} twice")

@@ -227,7 +227,7 @@ def matlab_file(path, table, **options):
 def test_other_matlab_files_are_refused(small, tmp_path):
     path = tmp_path / "t.mat"
     assert_same(small, load_table(matlab_file(path, small)))
-    assert "-v6" in refuse(matlab_file(path, small, do_compression=True))
+    assert "compressed" in refuse(matlab_file(path, small, do_compression=True))
     gains = to_document(small).columns["K1_1"][:, None]
     for wrong in (gains + 1j, gains.T, gains.astype(np.float32), "text", {"a": gains}):
         refuse(matlab_file(path, small, fields={"K1_1": wrong}))
