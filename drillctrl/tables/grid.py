@@ -162,11 +162,12 @@ class Grid:
             return rig_point_at_weight_on_bit(placed, speed, feed)
         return RigPoint(placed, speed, feed)
 
-    def groups(self, coordinates: FloatArray) -> FloatArray:
-        """Return ω0, δ0 and ψ at coordinates on the axes, (q, 3) → (q, 3)."""
+    def groups(self, coordinates: npt.ArrayLike) -> FloatArray:
+        """Return ω0, δ0 and ψ at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
+        places = np.atleast_2d(np.asarray(coordinates, dtype=float))
         if self.rig is None:
-            return coordinates
-        points = [self.point(*row) for row in coordinates.tolist()]
+            return places
+        points = [self.point(*row) for row in places.tolist()]
         return np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
 
     def locate(

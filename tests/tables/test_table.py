@@ -86,6 +86,7 @@ def test_rig_coordinates_and_groups_are_inverse():
             places[1, 1] = 8e-3
         back = grid.locate(*grid.groups(places).T)
         assert back == pytest.approx(places, rel=1e-12)
+        assert grid.groups(list(places[0])).tolist() == grid.groups(places[:1]).tolist()
 
 
 def test_a_worker_more_changes_nothing(small):
