@@ -17,7 +17,7 @@ from drillctrl import (
     preset_structure,
     semidiscretize,
 )
-from drillctrl.optimisation.family import LoopFamily, loop_family
+from drillctrl.synthesis.family import LoopFamily, loop_family
 
 
 def main() -> None:

@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from drillctrl import Controller, OperatingPoint, chart, design, preset_structure, simulate
-from drillctrl.charts.plotting import plot_charts
-from drillctrl.plotting import BLUE, GREY, save_figure
+from drillctrl.base.figure import BLUE, GREY, save_figure
+from drillctrl.charts.figure import plot_charts
 
 TARGET = Path(__file__).parent / "_static" / "hero.png"
 SWITCHED_ON = 150.0

@@ -10,48 +10,41 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from drillctrl.analysis import LoopAnalysis, analyze_loop
-    from drillctrl.axial_feedback import feed
-    from drillctrl.campaigns.campaign import Campaign, campaign
+    from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.base.errors import InputError
+    from drillctrl.charts.chart import StabilityChart, chart
     from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
-    from drillctrl.charts.stability_chart import StabilityChart, chart
     from drillctrl.charts.volume import StabilityVolume, stability_volume
-    from drillctrl.checkpoint import Checkpoint
-    from drillctrl.comparison.comparing import Comparison, compare
-    from drillctrl.delay_system import DelaySystem, plant_system
-    from drillctrl.design_result import Design
-    from drillctrl.designing import analyze, design
-    from drillctrl.errors import InputError
-    from drillctrl.feedback import FeedbackStructure, Tie, close_loop, preset_structure
-    from drillctrl.instrumentation import with_actuator_lag, with_filter
+    from drillctrl.delay.structure import FeedbackStructure, Tie, close_loop, preset_structure
+    from drillctrl.delay.system import DelaySystem, plant_system
+    from drillctrl.designs.design import analyze, design
+    from drillctrl.designs.loop_analysis import LoopAnalysis, analyze_loop
+    from drillctrl.designs.result import Design
+    from drillctrl.drilling.drive import soft_torque, top_drive_plant
+    from drillctrl.drilling.plant import Plant, dimensional_plant, dimensionless_plant
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
+    from drillctrl.drilling.rig import Rig, load_rig, save_rig, table1
+    from drillctrl.drilling.sensors import with_actuator_lag, with_filter
+    from drillctrl.drilling.steady import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.drilling.structures import feed
     from drillctrl.interop.controllers import controller_system, scheduled_controller
     from drillctrl.interop.lifted import lifted_system, pade_approximation
     from drillctrl.interop.plants import from_control
-    from drillctrl.operating_point import OperatingPoint, RigPoint
-    from drillctrl.optimisation.objectives import (
-        Exact,
-        Requirements,
-        Robust,
-        SemiDiscrete,
-        WorstCase,
-    )
-    from drillctrl.plant import Plant, dimensional_plant, dimensionless_plant
-    from drillctrl.reproduction.agreement import Agreement
-    from drillctrl.reproduction.reproducing import reproduce
-    from drillctrl.rig import Rig, load_rig, save_rig, table1
+    from drillctrl.paper.agreement import Agreement
+    from drillctrl.paper.reproduce import reproduce
     from drillctrl.robustness.margins import delay_margin, parameter_margin, point_margins
     from drillctrl.robustness.radius import (
         pseudospectral_abscissa,
         real_stability_radius,
         stability_radius,
     )
+    from drillctrl.robustness.transfer import frequency_response, loop_frd, loop_transfer, to_frd
     from drillctrl.simulation import Change, Controller, Past, Scenario, Simulation, simulate
     from drillctrl.simulation.energy import band_energy
     from drillctrl.simulation.floquet import floquet
     from drillctrl.simulation.orbits import limit_cycle, separation
     from drillctrl.spectrum.batch import spectral_abscissas
-    from drillctrl.spectrum.comparison import compare_spectra, intervals_for
     from drillctrl.spectrum.count import count_right_of
     from drillctrl.spectrum.proof import prove_count
     from drillctrl.spectrum.roots import (
@@ -62,111 +55,118 @@ if TYPE_CHECKING:
     )
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
     from drillctrl.spectrum.sensitivity import root_sensitivity
-    from drillctrl.steady_drilling import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.spectrum.trust import compare_spectra, intervals_for
+    from drillctrl.studies.campaign import Campaign, campaign
+    from drillctrl.studies.compare import Comparison, compare
+    from drillctrl.synthesis.objectives import (
+        Exact,
+        Requirements,
+        Robust,
+        SemiDiscrete,
+        WorstCase,
+    )
     from drillctrl.tables.files import load_table, save_table
     from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
     from drillctrl.tables.table import GainTable, table
-    from drillctrl.top_drive import soft_torque, top_drive_plant
-    from drillctrl.transfer import frequency_response, loop_frd, loop_transfer, to_frd
 
 _HOME = {
-    "Agreement": "reproduction.agreement",
+    "Agreement": "paper.agreement",
     "Axis": "tables.grid",
-    "Campaign": "campaigns.campaign",
+    "Campaign": "studies.campaign",
     "Change": "simulation",
-    "Checkpoint": "checkpoint",
-    "Comparison": "comparison.comparing",
+    "Checkpoint": "base.checkpoint",
+    "Comparison": "studies.compare",
     "Controller": "simulation",
-    "DelaySystem": "delay_system",
-    "Design": "design_result",
-    "Exact": "optimisation.objectives",
-    "FeedbackStructure": "feedback",
+    "DelaySystem": "delay.system",
+    "Design": "designs.result",
+    "Exact": "synthesis.objectives",
+    "FeedbackStructure": "delay.structure",
     "GainSurface": "charts.discretised",
     "GainTable": "tables.table",
     "Grid": "tables.grid",
-    "InputError": "errors",
-    "LoopAnalysis": "analysis",
-    "OperatingPoint": "operating_point",
+    "InputError": "base.errors",
+    "LoopAnalysis": "designs.loop_analysis",
+    "OperatingPoint": "drilling.point",
     "Past": "simulation",
-    "Plant": "plant",
-    "Requirements": "optimisation.objectives",
-    "Rig": "rig",
-    "RigPoint": "operating_point",
-    "Robust": "optimisation.objectives",
+    "Plant": "drilling.plant",
+    "Requirements": "synthesis.objectives",
+    "Rig": "drilling.rig",
+    "RigPoint": "drilling.point",
+    "Robust": "synthesis.objectives",
     "Root": "spectrum.roots",
     "RootLocus": "charts.discretised",
     "Scenario": "simulation",
-    "SemiDiscrete": "optimisation.objectives",
+    "SemiDiscrete": "synthesis.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
     "Simulation": "simulation",
     "StabilisableChart": "charts.stabilisable",
-    "StabilityChart": "charts.stability_chart",
+    "StabilityChart": "charts.chart",
     "StabilityVolume": "charts.volume",
-    "SteadyState": "steady_drilling",
-    "Tie": "feedback",
-    "WorstCase": "optimisation.objectives",
-    "analyze": "designing",
-    "analyze_loop": "analysis",
+    "SteadyState": "drilling.steady",
+    "Tie": "delay.structure",
+    "WorstCase": "synthesis.objectives",
+    "analyze": "designs.design",
+    "analyze_loop": "designs.loop_analysis",
     "band_energy": "simulation.energy",
-    "campaign": "campaigns.campaign",
+    "campaign": "studies.campaign",
     "characteristic_roots": "spectrum.roots",
-    "chart": "charts.stability_chart",
-    "close_loop": "feedback",
-    "compare": "comparison.comparing",
-    "compare_spectra": "spectrum.comparison",
+    "chart": "charts.chart",
+    "close_loop": "delay.structure",
+    "compare": "studies.compare",
+    "compare_spectra": "spectrum.trust",
     "controller_system": "interop.controllers",
     "count_right_of": "spectrum.count",
     "delay_margin": "robustness.margins",
-    "design": "designing",
-    "dimensional_plant": "plant",
+    "design": "designs.design",
+    "dimensional_plant": "drilling.plant",
     "dimensionless_grid": "tables.grid",
-    "dimensionless_plant": "plant",
+    "dimensionless_plant": "drilling.plant",
     "dominant_roots": "spectrum.roots",
-    "feed": "axial_feedback",
+    "feed": "drilling.structures",
     "floquet": "simulation.floquet",
-    "frequency_response": "transfer",
+    "frequency_response": "robustness.transfer",
     "from_control": "interop.plants",
     "gain_surface": "charts.discretised",
-    "intervals_for": "spectrum.comparison",
+    "intervals_for": "spectrum.trust",
     "lifted_system": "interop.lifted",
     "limit_cycle": "simulation.orbits",
     "linear_axis": "tables.grid",
-    "load_rig": "rig",
+    "load_rig": "drilling.rig",
     "load_table": "tables.files",
-    "loop_frd": "transfer",
-    "loop_transfer": "transfer",
+    "loop_frd": "robustness.transfer",
+    "loop_transfer": "robustness.transfer",
     "pade_approximation": "interop.lifted",
     "parameter_margin": "robustness.margins",
-    "plant_system": "delay_system",
+    "plant_system": "delay.system",
     "point_margins": "robustness.margins",
-    "preset_structure": "feedback",
+    "preset_structure": "delay.structure",
     "prove_count": "spectrum.proof",
     "pseudospectral_abscissa": "robustness.radius",
     "real_stability_radius": "robustness.radius",
-    "reproduce": "reproduction.reproducing",
+    "reproduce": "paper.reproduce",
     "rig_grid": "tables.grid",
-    "rig_point_at_weight_on_bit": "steady_drilling",
+    "rig_point_at_weight_on_bit": "drilling.steady",
     "root_locus": "charts.discretised",
     "root_sensitivity": "spectrum.sensitivity",
-    "save_rig": "rig",
+    "save_rig": "drilling.rig",
     "save_table": "tables.files",
     "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
     "separation": "simulation.orbits",
     "simulate": "simulation",
-    "soft_torque": "top_drive",
+    "soft_torque": "drilling.drive",
     "spectral_abscissa": "spectrum.roots",
     "spectral_abscissas": "spectrum.batch",
     "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "stability_volume": "charts.volume",
-    "steady_state": "steady_drilling",
+    "steady_state": "drilling.steady",
     "table": "tables.table",
-    "table1": "rig",
-    "to_frd": "transfer",
-    "top_drive_plant": "top_drive",
-    "with_actuator_lag": "instrumentation",
-    "with_filter": "instrumentation",
+    "table1": "drilling.rig",
+    "to_frd": "robustness.transfer",
+    "top_drive_plant": "drilling.drive",
+    "with_actuator_lag": "drilling.sensors",
+    "with_filter": "drilling.sensors",
 }
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drillctrl import units
-from drillctrl.errors import InputError, checked_number
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.operating_point import RigPoint
-from drillctrl.units import Dimension
+from drillctrl.base import units
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.units import Dimension
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.point import RigPoint
 
 # Permitted range and symbol of each dimensionless group.
 GROUPS = {

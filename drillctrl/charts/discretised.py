@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.figure import GREY, ORANGE, new_axes
 from drillctrl.charts.axes import GROUPS, Axis, make_axis
-from drillctrl.charts.plotting import axis_text, draw_curves
-from drillctrl.charts.stability_chart import AxisLike, StabilityChart, chart, make_plane
-from drillctrl.delay_system import plant_system
-from drillctrl.design_result import Design
-from drillctrl.designing import design
-from drillctrl.errors import InputError, checked_integer
-from drillctrl.feedback import FeedbackStructure, close_loop, preset_structure
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plotting import GREY, ORANGE, new_axes
+from drillctrl.charts.chart import AxisLike, StabilityChart, chart, make_plane
+from drillctrl.charts.figure import axis_text, draw_curves
+from drillctrl.delay.structure import FeedbackStructure, close_loop, preset_structure
+from drillctrl.delay.system import plant_system
+from drillctrl.designs.design import design
+from drillctrl.designs.result import Design
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.semidiscretization import semidiscretize
 

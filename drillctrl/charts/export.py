@@ -12,8 +12,8 @@ from drillctrl.charts.chains import Curve
 from drillctrl.charts.plane import Plane
 
 if TYPE_CHECKING:
+    from drillctrl.charts.chart import StabilityChart
     from drillctrl.charts.stabilisable import StabilisableChart
-    from drillctrl.charts.stability_chart import StabilityChart
 
 
 def plane_fields(plane: Plane) -> dict[str, Any]:

@@ -6,12 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drillctrl.base.errors import InputError
 from drillctrl.charts.axes import RIG_AXES, Axis, to_si_factor
-from drillctrl.delay_system import DelaySystem, plant_system
-from drillctrl.errors import InputError
-from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
-from drillctrl.operating_point import OperatingPoint, RigPoint
-from drillctrl.plant import PARAMETER_NAMES, dimensionless_plant, linearisation, parameter_vector
+from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
+from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.drilling.plant import (
+    PARAMETER_NAMES,
+    dimensionless_plant,
+    linearisation,
+    parameter_vector,
+)
+from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices
 

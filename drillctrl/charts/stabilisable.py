@@ -8,22 +8,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, stable_curves
+from drillctrl.charts.chart import AxisLike, chart, first_position, make_plane
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
-from drillctrl.charts.stability_chart import AxisLike, chart, first_position, make_plane
 from drillctrl.charts.sweep import sweep
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure, preset_structure
-from drillctrl.operating_point import OperatingPoint, RigPoint
-from drillctrl.optimisation.gain_margin import check_gains
+from drillctrl.delay.structure import FeedbackStructure, preset_structure
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.synthesis.gain_margin import check_gains
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from drillctrl.charts.stability_chart import StabilityChart
+    from drillctrl.charts.chart import StabilityChart
 
 _NARROWEST = 3e-3
 # Roots of loops with longer delays crowd the axis, and gains that tame them are not looked for.
@@ -104,8 +104,8 @@ class StabilisableChart:
         return stabilisable_summary(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the set and the open loop's; see `drillctrl.charts.plotting.plot_charts`."""
-        from drillctrl.charts.plotting import plot_charts
+        """Draw the set and the open loop's; see `drillctrl.charts.figure.plot_charts`."""
+        from drillctrl.charts.figure import plot_charts
 
         name = f"some gains of {self.structure.name}"
         return plot_charts({name: self, "open loop": self.open_loop}, ax)
@@ -160,7 +160,7 @@ def stabilisable_chart(
     Notes
     -----
     Whether gains exist at a place is decided on the explicit curves of gains that hold a
-    root at the line (see `drillctrl.optimisation.gain_margin`), not by a search over gains.
+    root at the line (see `drillctrl.synthesis.gain_margin`), not by a search over gains.
     """
     began = time.perf_counter()
     plane = make_plane(point, x, y, None, None, None)

@@ -15,11 +15,11 @@ import scipy.optimize
 
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
-from drillctrl.delay_system import plant_system
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.optimisation.family import loop_family
-from drillctrl.optimisation.gain_margin import GainMargin, gain_margin
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import plant_system
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.gain_margin import GainMargin, gain_margin
 
 _DIP = 0.3
 _CEILING = 10.0

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.files import replacing
 from drillctrl.charts.axes import GROUPS, Axis, make_axis
-from drillctrl.charts.plane import Plane
-from drillctrl.charts.scan import ScanLine
-from drillctrl.charts.stability_chart import (
+from drillctrl.charts.chart import (
     AxisLike,
     StabilityChart,
     chart,
@@ -22,10 +22,10 @@ from drillctrl.charts.stability_chart import (
     first_position,
     make_plane,
 )
-from drillctrl.errors import InputError, checked_integer
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.files import replacing
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.charts.plane import Plane
+from drillctrl.charts.scan import ScanLine
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.spectrum.characteristic import FloatArray
 
 # What a mesh is written as, by the file's ending.
@@ -173,8 +173,8 @@ class StabilityVolume:
         )
 
     def plot(self, ax: Any | None = None) -> Any:
-        """Draw the surface; see `drillctrl.charts.volume_plotting.plot_volume`."""
-        from drillctrl.charts.volume_plotting import plot_volume
+        """Draw the surface; see `drillctrl.charts.volume_figure.plot_volume`."""
+        from drillctrl.charts.volume_figure import plot_volume
 
         return plot_volume(self, ax)
 

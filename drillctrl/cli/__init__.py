@@ -7,6 +7,7 @@ import sys
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.analyze import analyze_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
@@ -14,7 +15,6 @@ from drillctrl.cli.design import design_command
 from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.simulate import simulate_command
 from drillctrl.cli.table import table_command
-from drillctrl.errors import InputError
 
 BAD_INPUT = 2
 

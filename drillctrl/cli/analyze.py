@@ -43,7 +43,7 @@ def analyze_command(
     """
     check_outputs(out, plot)
     where = read_point(point)
-    from drillctrl.designing import analyze
+    from drillctrl.designs.design import analyze
 
     gains = read_gains("K1", k1), read_gains("K2", k2)
     result = analyze(where, structure, *gains, m=m, order=order)

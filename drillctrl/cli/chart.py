@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.gains import read_bounds, read_gains
 from drillctrl.cli.output import (
     check_figure,
@@ -20,13 +21,12 @@ from drillctrl.cli.output import (
 )
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.verb import Verb
-from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
+    from drillctrl.charts.chart import StabilityChart
     from drillctrl.charts.stabilisable import StabilisableChart
-    from drillctrl.charts.stability_chart import StabilityChart
     from drillctrl.charts.volume import StabilityVolume
-    from drillctrl.operating_point import OperatingPoint, RigPoint
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
 
 MESH_ENDINGS = (".vtk", ".ply", ".stl")
 
@@ -136,7 +136,7 @@ def chart_command(
     else:
         if bound:
             raise InputError("--bound", bound[0], "given only with --optimise")
-        from drillctrl.charts.stability_chart import chart
+        from drillctrl.charts.chart import chart
 
         result = chart(where, x, y, structure, *gains, level=level)
     fields = result.to_dict()
@@ -159,7 +159,7 @@ def _volume(
     slices: int,
 ) -> StabilityVolume:
     from drillctrl.charts.volume import stability_volume
-    from drillctrl.operating_point import RigPoint
+    from drillctrl.drilling.point import RigPoint
 
     if isinstance(where, RigPoint):
         raise InputError("--z", z_axis, "given with dimensionless groups, not with --rig")
@@ -177,7 +177,7 @@ def _optimised(
     bound: tuple[str, ...],
 ) -> StabilisableChart:
     from drillctrl.charts.stabilisable import stabilisable_chart
-    from drillctrl.feedback import preset_structure
+    from drillctrl.delay.structure import preset_structure
 
     for name, given in zip(("--K1", "--K2"), gains, strict=True):
         if given is not None:

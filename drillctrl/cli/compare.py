@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.verb import Verb
-from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
-    from drillctrl.comparison.comparing import Comparison, Given, Progress
+    from drillctrl.studies.compare import Comparison, Given, Progress
 
 ENDINGS = (".html", ".csv", ".json")
 
@@ -65,8 +65,8 @@ def compare_command(
         raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
     where, names = read_point(point), [name.strip() for name in structures.split(",")]
     candidates = [read_given(text) for text in given]
-    from drillctrl.cli.running import read_numbers
-    from drillctrl.comparison.comparing import REGION, compare
+    from drillctrl.cli.scenario import read_numbers
+    from drillctrl.studies.compare import REGION, compare
 
     with _progress() as progress:
         result = compare(
@@ -109,7 +109,7 @@ def read_given(text: str) -> Given:
 
 
 def _write(result: Comparison, out: str) -> None:
-    from drillctrl.files import write_text
+    from drillctrl.base.files import write_text
 
     ending = Path(out).suffix.lower()
     if ending == ".html":

@@ -63,7 +63,7 @@ def design_command(
     check_outputs(out, plot)
     objective, requirements = read_objective(options), read_requirements(options)
     where = read_point(options)
-    from drillctrl.designing import design
+    from drillctrl.designs.design import design
 
     result = design(
         where,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 
 def read_bounds(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:

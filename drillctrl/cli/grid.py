@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
+    from drillctrl.base.units import Dimension
     from drillctrl.tables.grid import Axis, Grid
-    from drillctrl.units import Dimension
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -64,7 +64,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
     for name in ("omega0", "delta0"):
         if name not in groups:
             raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
-    from drillctrl.operating_point import OperatingPoint
+    from drillctrl.drilling.point import OperatingPoint
 
     damping = groups.pop("damping", None)
     if damping is not None:
@@ -78,8 +78,8 @@ def read_grid(options: dict[str, Any]) -> Grid:
 
 
 def _rig_grid(given: dict[str, str]) -> Grid:
-    from drillctrl import units
-    from drillctrl.rig import load_rig
+    from drillctrl.base import units
+    from drillctrl.drilling.rig import load_rig
     from drillctrl.tables.grid import rig_grid
 
     for name in ("rig", "speed"):
@@ -105,7 +105,7 @@ def _rig_grid(given: dict[str, str]) -> Grid:
 
 def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:
     """Read ``LOW:HIGH:COUNT`` or one number, with a unit behind it where there is one."""
-    from drillctrl import units
+    from drillctrl.base import units
     from drillctrl.tables.grid import linear_axis
 
     flag = f"--{option.replace('_', '-')}"

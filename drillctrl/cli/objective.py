@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
-    from drillctrl.optimisation.objectives import Objective, Requirements
+    from drillctrl.synthesis.objectives import Objective, Requirements
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -67,7 +67,7 @@ def requirement_options(command: Command) -> Command:
 
 def read_requirements(options: dict[str, Any]) -> Requirements:
     """Take the options of `requirement_options` out of a mapping."""
-    from drillctrl.optimisation.objectives import Requirements
+    from drillctrl.synthesis.objectives import Requirements
 
     return Requirements(
         **{parameter: options.pop(option) for option, parameter in _REQUIREMENTS.items()}
@@ -82,7 +82,7 @@ def read_objective(options: dict[str, Any]) -> Objective:
     InputError
         If the objective is unknown, or an option belongs to another one.
     """
-    from drillctrl.optimisation.objectives import Exact, Robust, SemiDiscrete, WorstCase
+    from drillctrl.synthesis.objectives import Exact, Robust, SemiDiscrete, WorstCase
 
     kinds: dict[str, Callable[..., Objective]] = {
         "exact": Exact,

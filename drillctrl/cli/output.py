@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ def check_figure(plot: str | None) -> None:
     """Refuse a bad name of a figure before any work is done."""
     check_folder("--plot", plot)
     if plot is not None:
-        from drillctrl.plotting import check_figure_path
+        from drillctrl.base.figure import check_figure_path
 
         check_figure_path(plot)
 
@@ -60,13 +60,13 @@ def writing(parameter: str, path: str, write: Callable[[], None]) -> None:
 
 def write_json(out: str, fields: dict[str, Any]) -> None:
     """Write what ``--json`` would print to a file."""
-    from drillctrl.files import write_text
+    from drillctrl.base.files import write_text
 
     writing("--out", out, lambda: write_text(out, json_text(fields) + "\n"))
 
 
 def write_figure(plot: str, figure: Figure) -> None:
     """Write a figure by the file's ending."""
-    from drillctrl.plotting import save_figure
+    from drillctrl.base.figure import save_figure
 
     writing("--plot", plot, lambda: save_figure(figure, plot))

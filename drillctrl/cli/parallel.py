@@ -15,10 +15,10 @@ from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
-    from drillctrl.spreading import Progress
+    from drillctrl.base.workers import Progress
 
 
 @contextlib.contextmanager

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
-    from drillctrl.operating_point import OperatingPoint, RigPoint
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -75,7 +75,7 @@ def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
 
 
 def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
-    from drillctrl.operating_point import OperatingPoint
+    from drillctrl.drilling.point import OperatingPoint
 
     values = {**_POINT_C, **groups}
     damping = values.pop("damping", None)
@@ -88,10 +88,10 @@ def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
 
 
 def _rig_point(given: dict[str, Any]) -> RigPoint:
-    from drillctrl import units
-    from drillctrl.operating_point import RigPoint
-    from drillctrl.rig import load_rig
-    from drillctrl.steady_drilling import rig_point_at_weight_on_bit
+    from drillctrl.base import units
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.drilling.rig import load_rig
+    from drillctrl.drilling.steady import rig_point_at_weight_on_bit
 
     for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
         if name not in given:

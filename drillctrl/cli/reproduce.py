@@ -31,8 +31,8 @@ def reproduce_command(figures: tuple[str, ...], out: str, as_json: bool) -> None
       drillctrl reproduce all --out paper
       drillctrl reproduce fig8 fig14
     """
-    from drillctrl.reproduction.agreement import as_json as rows_as_json
-    from drillctrl.reproduction.reproducing import reproduce
+    from drillctrl.paper.agreement import as_json as rows_as_json
+    from drillctrl.paper.reproduce import reproduce
 
     def show(name: str, done: int, total: int) -> None:
         click.echo(f"{done}/{total} {name}", err=True)

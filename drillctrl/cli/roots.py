@@ -11,7 +11,7 @@ import click
 from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
 
 if TYPE_CHECKING:
-    from drillctrl.design_result import Design
+    from drillctrl.designs.result import Design
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.point import point_options, read_point
-from drillctrl.cli.running import (
+from drillctrl.cli.scenario import (
     controller_options,
     read_controller,
     read_duration,
     read_scenario,
 )
 from drillctrl.cli.verb import Verb
-from drillctrl.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,9 +96,9 @@ def simulate_command(
     if start not in ("steady", "rest"):
         raise InputError("--start", start, "steady or rest")
     where = read_point(options)
-    from drillctrl.operating_point import RigPoint
+    from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation import simulate
-    from drillctrl.simulation.build import is_compiled
+    from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
     from drillctrl.simulation.run import checked_run
@@ -145,17 +145,22 @@ def simulate_command(
 
 
 def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure:
-    from drillctrl.simulation import plotting
+    from drillctrl.simulation.figure import (
+        plot_against_linear,
+        plot_motion,
+        plot_phase_portrait,
+        plot_rock_face,
+    )
 
     if figure == "motion":
-        return plotting.plot_motion(run)
+        return plot_motion(run)
     if figure == "linear":
-        ax = plotting.plot_against_linear(run, again("linear"))
+        ax = plot_against_linear(run, again("linear"))
     elif figure == "face":
-        ax = plotting.plot_rock_face(run)
+        ax = plot_rock_face(run)
     else:
         plane = "torsion" if figure == "phase" else "axial"
-        ax = plotting.plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
+        ax = plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
     drawn = ax.get_figure(root=True)
     assert drawn is not None
     return drawn

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.parallel import open_executor, open_progress
 from drillctrl.cli.verb import Verb, naming
-from drillctrl.errors import InputError, checked_integer, checked_number
 
 if TYPE_CHECKING:
-    from drillctrl.checkpoint import Checkpoint
-    from drillctrl.feedback import FeedbackStructure
+    from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.delay.structure import FeedbackStructure
     from drillctrl.tables.grid import Grid
     from drillctrl.tables.table import GainTable
 
@@ -134,9 +134,9 @@ def _design(
     options: dict[str, Any], out: str | None, controller: dict[str, Any]
 ) -> tuple[GainTable, Checkpoint | None]:
     """Return the table that the options ask for, and where its designs are kept."""
-    from drillctrl.checkpoint import Checkpoint
-    from drillctrl.feedback import preset_structure
-    from drillctrl.optimisation.objectives import Exact
+    from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.delay.structure import preset_structure
+    from drillctrl.synthesis.objectives import Exact
     from drillctrl.tables.table import table
 
     workers, scheduler = options["workers"], options["scheduler"]

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from drillctrl.errors import InputError
+from drillctrl.base.errors import InputError
 
 
 class Verb(click.Command):

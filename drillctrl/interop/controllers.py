@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError, checked_number
-from drillctrl.feedback import FeedbackStructure, gain_matrices
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.structure import FeedbackStructure, gain_matrices
 from drillctrl.spectrum.characteristic import FloatArray
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from drillctrl.delay_system import DelaySystem
-from drillctrl.errors import InputError, checked_integer
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.delay.system import DelaySystem
+from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum.characteristic import FloatArray, magnitude_bound
 from drillctrl.spectrum.semidiscretization import semidiscretize
-from drillctrl.transfer import frequency_response
 
 if TYPE_CHECKING:
     import control

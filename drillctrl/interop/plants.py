@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.delay_system import DelaySystem
-from drillctrl.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.system import DelaySystem
 
 if TYPE_CHECKING:
     import control

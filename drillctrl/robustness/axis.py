@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
-from drillctrl.delay_system import DelaySystem
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 

@@ -10,11 +10,11 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from drillctrl.delay_system import DelaySystem, plant_system
-from drillctrl.errors import InputError, checked_number
-from drillctrl.feedback import FeedbackStructure, close_loop
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import Plant
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.structure import FeedbackStructure, close_loop
+from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.drilling.plant import Plant
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.robustness.axis import crossings, sharpen_crossing
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import spectral_abscissa

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.delay_system import DelaySystem
-from drillctrl.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import AxisMinimum, line_minimum, weighted_minimum
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import FloatArray

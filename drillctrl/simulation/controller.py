@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure, gain_matrices, preset_structure
-from drillctrl.plant import INPUT_NAMES, STATE_NAMES
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.delay.structure import FeedbackStructure, gain_matrices, preset_structure
+from drillctrl.drilling.plant import INPUT_NAMES, STATE_NAMES
 
 FloatArray = npt.NDArray[np.float64]
 DELAYS = ("fixed", "current")

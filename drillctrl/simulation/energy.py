@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.signal
 
-from drillctrl.errors import InputError
-from drillctrl.rig import Rig
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.rig import Rig
 from drillctrl.simulation.result import Simulation
 
 _SAMPLES = 8192

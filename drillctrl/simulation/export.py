@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drillctrl.errors import InputError
-from drillctrl.files import replacing
+from drillctrl.base.errors import InputError
+from drillctrl.base.files import replacing
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.rig_units import SI_UNITS
 

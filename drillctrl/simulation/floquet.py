@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.simulation.build import kernel
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.orbits import limit_cycle
 from drillctrl.simulation.past import Past, padded, restrict

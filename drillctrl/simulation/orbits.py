@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError, checked_number
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import STATE_NAMES
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.drilling.plant import STATE_NAMES
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate

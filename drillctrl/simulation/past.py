@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
-from drillctrl.errors import InputError, checked_number
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.simulation.build import kernel
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.compile import kernel
 
 if TYPE_CHECKING:
     from drillctrl.simulation.result import Simulation

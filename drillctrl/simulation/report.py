@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctrl import units
+from drillctrl.base import units
 from drillctrl.simulation.result import Simulation
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.rig import Rig
-from drillctrl.simulation.build import kernel
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.rig import Rig
+from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.past import Past, past_of
 from drillctrl.simulation.rig_units import RigMotion, in_rig_units
@@ -345,7 +345,7 @@ class Simulation:
 
     def plot(self) -> Figure:
         """Draw axial motion, bit speed and control over time; see `plot_motion`."""
-        from drillctrl.simulation.plotting import plot_motion
+        from drillctrl.simulation.figure import plot_motion
 
         return plot_motion(self)
 

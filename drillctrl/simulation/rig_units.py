@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.rig import Rig
+from drillctrl.drilling.rig import Rig
 
 if TYPE_CHECKING:
-    from drillctrl.operating_point import OperatingPoint
+    from drillctrl.drilling.point import OperatingPoint
     from drillctrl.simulation.result import Motion
 
 FloatArray = npt.NDArray[np.float64]

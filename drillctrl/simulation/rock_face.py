@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.simulation.build import kernel
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.simulation.compile import kernel
 
 if TYPE_CHECKING:
     from drillctrl.simulation.result import Simulation

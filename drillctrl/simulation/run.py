@@ -6,13 +6,13 @@ import math
 import time
 from collections.abc import Mapping
 
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.operating_point import OperatingPoint, RigPoint
-from drillctrl.simulation.build import kernel
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, resized, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.setup import FIRST_ROOM, begin, check_start, resized, settings_for
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")

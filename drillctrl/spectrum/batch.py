@@ -9,17 +9,17 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.delay_system import DelaySystem, plant_system
-from drillctrl.errors import InputError
-from drillctrl.feedback import FeedbackStructure, loop_channels
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import (
+from drillctrl.base.errors import InputError
+from drillctrl.delay.structure import FeedbackStructure, loop_channels
+from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.drilling.plant import (
     INPUT_NAMES,
     PARAMETER_NAMES,
     dimensionless_plant,
     linearisation,
     parameter_vector,
 )
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import _blocks, degree_for_reach
 from drillctrl.spectrum.roots import EPSILON, spectral_abscissa

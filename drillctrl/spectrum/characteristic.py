@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import dgeev
 
-from drillctrl.delay_system import DelaySystem
+from drillctrl.delay.system import DelaySystem
 
 ComplexArray = npt.NDArray[np.complex128]
 FloatArray = npt.NDArray[np.float64]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.delay_system import DelaySystem
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.delay_system import DelaySystem
-from drillctrl.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.characteristic import FloatArray
 
 PRECISION = 106

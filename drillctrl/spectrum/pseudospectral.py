@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg.lapack import dgeev
 
-from drillctrl.delay_system import DelaySystem
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 
 MAX_DEGREE = 400

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.delay_system import DelaySystem
-from drillctrl.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import (

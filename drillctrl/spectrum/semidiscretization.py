@@ -16,8 +16,8 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
-from drillctrl.delay_system import DelaySystem, low_rank_factors
-from drillctrl.errors import InputError, checked_integer
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.delay.system import DelaySystem, low_rank_factors
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
 
 MAX_INTERVALS = 4000

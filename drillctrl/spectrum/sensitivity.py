@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.delay_system import DelaySystem, plant_system
-from drillctrl.errors import InputError
-from drillctrl.feedback import FeedbackStructure, close_loop, loop_channels
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import (
+from drillctrl.base.errors import InputError
+from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
+from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.drilling.plant import (
     PARAMETER_NAMES,
     Plant,
     dimensionless_plant,
     linearisation_sensitivity,
     parameter_vector,
 )
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.roots import Root, dominant_roots

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.optimisation.family import ActiveRoot
-from drillctrl.optimisation.objectives import EXACT, Exact, Objective
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.synthesis.family import ActiveRoot
+from drillctrl.synthesis.objectives import EXACT, Exact, Objective
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.node import NodeDesign, NodeTask, design_node
 

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.errors import checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure, Tie
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import INPUT_NAMES, STATE_NAMES
-from drillctrl.rig import Rig
+from drillctrl.base.errors import checked_integer, checked_number
+from drillctrl.delay.structure import FeedbackStructure, Tie
+from drillctrl.drilling.plant import INPUT_NAMES, STATE_NAMES
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.rig import Rig
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.grid import MAX_NODES, Axis, Grid
 from drillctrl.tables.interpolation import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drillctrl.errors import InputError
-from drillctrl.files import replacing
+from drillctrl.base.errors import InputError
+from drillctrl.base.files import replacing
 from drillctrl.tables.sampled import SampledController, filled, sampled_controller
 from drillctrl.tables.table import GainTable
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drillctrl.files import write_text
+from drillctrl.base.files import write_text
 from drillctrl.tables.sampled import SampledController, filled, sampled_controller
 from drillctrl.tables.table import GainTable
 

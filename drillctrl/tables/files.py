@@ -12,8 +12,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from drillctrl.errors import InputError
-from drillctrl.files import replacing
+from drillctrl.base.errors import InputError
+from drillctrl.base.files import replacing
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
 from drillctrl.tables.table import GainTable
 

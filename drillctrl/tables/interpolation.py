@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.delay_system import plant_system
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.optimisation.descent import bfgs
-from drillctrl.optimisation.family import loop_family
-from drillctrl.optimisation.measures import worst_case
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import plant_system
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.synthesis.descent import bfgs
+from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.measures import worst_case
 from drillctrl.tables.grid import Grid
 
 IntArray = npt.NDArray[np.intp]

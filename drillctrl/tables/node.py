@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.analysis import analyze_loop
-from drillctrl.delay_system import plant_system
-from drillctrl.designing import design
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.optimisation.certificate import certify_optimality
-from drillctrl.optimisation.family import ActiveRoot, LoopFamily, loop_family
-from drillctrl.optimisation.objectives import EXACT, Exact, Objective
-from drillctrl.optimisation.rounding import hold_multiple_root
-from drillctrl.optimisation.search import EFFORTS, Effort, Search, follow, global_search
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import plant_system
+from drillctrl.designs.design import design
+from drillctrl.designs.loop_analysis import analyze_loop
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.synthesis.certificate import certify_optimality
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
+from drillctrl.synthesis.objectives import EXACT, Exact, Objective
+from drillctrl.synthesis.rounding import hold_multiple_root
+from drillctrl.synthesis.search import EFFORTS, Effort, Search, follow, global_search
 
 # Gains of neighbours lie in the basins that matter; nothing else is begun from. Only the
 # lowest end is sharpened: where that is the wrong one, the node stands out afterwards.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.checkpoint import Checkpoint
-from drillctrl.optimisation.family import ActiveRoot
+from drillctrl.base.checkpoint import Checkpoint
+from drillctrl.synthesis.family import ActiveRoot
 from drillctrl.tables.node import NodeDesign, NodeTask
 
 

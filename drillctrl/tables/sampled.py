@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure
-from drillctrl.plant import STATE_NAMES
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.plant import STATE_NAMES
 from drillctrl.tables.document import rig_gain_units, to_document
 from drillctrl.tables.grid import DIMENSIONLESS, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE

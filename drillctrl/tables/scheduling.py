@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from drillctrl.errors import checked_number
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.base.errors import checked_number
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.spectrum.characteristic import FloatArray

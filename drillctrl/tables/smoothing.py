@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.feedback import BoolArray, FeedbackStructure
+from drillctrl.delay.structure import BoolArray, FeedbackStructure
 from drillctrl.spectrum.batch import spectral_abscissas
 from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.continuation import edges

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
-from drillctrl.checkpoint import Checkpoint
-from drillctrl.errors import InputError, checked_integer, checked_number
-from drillctrl.feedback import FeedbackStructure, preset_structure
-from drillctrl.optimisation.objectives import EXACT, Exact, Objective
+from drillctrl.base.checkpoint import Checkpoint
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.workers import Progress, spread_out
+from drillctrl.delay.structure import FeedbackStructure, preset_structure
 from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.spreading import Progress, spread_out
+from drillctrl.synthesis.objectives import EXACT, Exact, Objective
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import (
@@ -31,7 +31,7 @@ from drillctrl.tables.interpolation import (
     place,
 )
 from drillctrl.tables.node import NodeDesign, NodeTask, check_node
-from drillctrl.tables.refining import carried_over, refined_grid
+from drillctrl.tables.refinement import carried_over, refined_grid
 from drillctrl.tables.remembering import find_design, keep_design
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
@@ -230,8 +230,8 @@ class GainTable:
         return "\n".join(lines)
 
     def plot(self) -> Figure:
-        """Draw gains and α over the grid; see `tables.plotting.plot_table`."""
-        from drillctrl.tables.plotting import plot_table
+        """Draw gains and α over the grid; see `drillctrl.tables.figure.plot_table`."""
+        from drillctrl.tables.figure import plot_table
 
         return plot_table(self)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drillctrl import OperatingPoint, chart
-from drillctrl.charts.plotting import plot_charts
+from drillctrl.charts.figure import plot_charts
 from drillctrl.cli import main
 
 POINT = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)

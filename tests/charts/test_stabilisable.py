@@ -15,10 +15,10 @@ from drillctrl import (
     preset_structure,
     stabilisable_chart,
 )
-from drillctrl.charts.plotting import plot_charts
+from drillctrl.charts.figure import plot_charts
 from drillctrl.cli import main
-from drillctrl.optimisation.family import loop_family
-from drillctrl.optimisation.gain_margin import gain_margin
+from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.gain_margin import gain_margin
 
 QUICK = {"first_lines": 3, "samples": 5, "tolerance": 1e-2}
 POINT = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)

@@ -19,7 +19,7 @@ from drillctrl import (
     semidiscretize,
     stability_volume,
 )
-from drillctrl.charts.volume_plotting import plot_slices
+from drillctrl.charts.volume_figure import plot_slices
 
 POINT = OperatingPoint(10.0, 1.75, 14.0)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drillctrl.errors import InputError
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plotting import new_axes
+from drillctrl.base.errors import InputError
+from drillctrl.base.figure import new_axes
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation import Controller, simulate
-from drillctrl.simulation.plotting import (
+from drillctrl.simulation.figure import (
     plot_against_linear,
     plot_motion,
     plot_phase_portrait,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drillctrl.delay_system import plant_system
-from drillctrl.errors import InputError
-from drillctrl.feedback import close_loop
-from drillctrl.instrumentation import with_actuator_lag
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.base.errors import InputError
+from drillctrl.delay.structure import close_loop
+from drillctrl.delay.system import plant_system
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.sensors import with_actuator_lag
 from drillctrl.simulation import Change, Controller, Scenario, simulate
 from drillctrl.simulation.floquet import floquet, multipliers_at
 from drillctrl.simulation.orbits import limit_cycle

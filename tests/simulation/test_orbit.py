@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation import Controller, Scenario, simulate
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drillctrl.errors import InputError
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation import Change, Controller, Scenario, simulate
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from drillctrl import RigPoint, steady_state, table1
-from drillctrl.errors import InputError
-from drillctrl.operating_point import OperatingPoint
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation import Controller, Scenario, simulate
 from drillctrl.simulation.export import export_motion
 

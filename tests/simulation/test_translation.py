@@ -8,14 +8,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from drillctrl.operating_point import OperatingPoint
-from drillctrl.plant import (
+from drillctrl.drilling.plant import (
     branch_functions,
     dimensionless_plant,
     parameter_vector,
     rhs_function,
 )
-from drillctrl.simulation.build import kernel
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.translate import translate
 
 RNG = np.random.default_rng(7)

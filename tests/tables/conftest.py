@@ -3,7 +3,7 @@
 import pytest
 
 from drillctrl import dimensionless_grid, linear_axis, rig_grid, table, table1
-from drillctrl.units import ROTARY_SPEED, SPEED, to_si
+from drillctrl.base.units import ROTARY_SPEED, SPEED, to_si
 
 
 @pytest.fixture(scope="session")

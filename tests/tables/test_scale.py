@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_table, table
-from drillctrl.checkpoint import Checkpoint
+from drillctrl.base.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
 QUICK = ["table", "--omega0", "6:22:9", "--delta0", "1:11:5", "--out"]

@@ -1,1 +1,1 @@
-"""The compiled integrator. Not imported from here: see `drillctrl.simulation.build`."""
+"""The compiled integrator. Not imported from here: see `drillctrl.simulation.compile`."""

@@ -1,0 +1,221 @@
+"""Figures of charts. Every function takes matplotlib Axes, or makes them, and returns them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
+from drillctrl.charts.axes import Axis
+from drillctrl.charts.chains import Curve, stable_strips
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.axes import Axes
+
+    from drillctrl.charts.chart import StabilityChart
+    from drillctrl.charts.plane import Plane
+    from drillctrl.charts.stabilisable import StabilisableChart
+    from drillctrl.spectrum.characteristic import FloatArray
+
+    Scale = Callable[[Any], Any]
+
+STYLES = ("-", "--", "-.", ":")
+
+
+def label_axes(ax: Axes, plane: Plane) -> None:
+    """Set limits and labels, with rpm and m/h on twin axes where a rig is known."""
+    ax.set_xlim(plane.x.low, plane.x.high)
+    ax.set_ylim(plane.y.low, plane.y.high)
+    ax.set_xlabel(axis_text(plane.x))
+    ax.set_ylabel(axis_text(plane.y))
+    if plane.rig_point is None:
+        return
+    rig = plane.rig_point.rig
+    rpm = 30.0 / np.pi / rig.time_scale
+    # v0 = δ0 ω0: at one speed, δ0 is proportional to the rate of penetration.
+    metres = plane.rig_point.rotary_speed * rig.axial_scale * 3600.0
+    twins = {
+        "omega0": (rpm, "rotary speed, rpm"),
+        "delta0": (metres, f"rate of penetration at {_speed_text(plane)}, m/h"),
+    }
+    if plane.x.name in twins:
+        factor, text = twins[plane.x.name]
+        ax.secondary_xaxis("top", functions=_scaling(factor)).set_xlabel(text)
+    if plane.y.name in twins:
+        factor, text = twins[plane.y.name]
+        ax.secondary_yaxis("right", functions=_scaling(factor)).set_ylabel(text)
+
+
+def _scaling(factor: float) -> tuple[Scale, Scale]:
+    return (lambda value: np.asarray(value) * factor, lambda value: np.asarray(value) / factor)
+
+
+def _speed_text(plane: Plane) -> str:
+    assert plane.rig_point is not None
+    return f"{plane.rig_point.rotary_speed * 30.0 / np.pi:.0f} rpm"
+
+
+def axis_text(axis: Axis) -> str:
+    """Return the label of an axis, in words and with its symbol."""
+    words = {
+        "omega0": "rotary speed $\\omega_0$",
+        "delta0": "nominal depth of cut $\\delta_0$",
+        "psi": "cutting coefficient $\\psi$",
+        "eta": "frequency ratio $\\eta$",
+        "xi": "axial damping ratio $\\xi$",
+        "kappa": "torsional damping ratio $\\kappa$",
+        "damping": "damping ratios $\\xi = \\kappa$",
+    }
+    if axis.name[:1] == "K" and axis.name[1:2].isdigit():
+        head, *indices = axis.name.split("_")
+        delayed = " on the delayed output" if head == "K2" else ""
+        return f"gain ${head[0]}_{{{','.join([head[1:], *indices])}}}${delayed}"
+    return words.get(axis.name, axis.label)
+
+
+def plane_title(plane: Plane) -> str:
+    """Say what is held in the chart."""
+    point = plane.point
+    held = {
+        "omega0": (f"$\\omega_0$ = {point.omega0:g}", {"speed"}),
+        "delta0": (f"$\\delta_0$ = {point.delta0:g}", {"speed", "rop", "rock_strength"}),
+        "psi": (f"$\\psi$ = {point.psi:.4g}", {"rock_strength"}),
+        "xi": (f"$\\xi$ = {point.xi:.3g}", {"damping"}),
+        "kappa": (f"$\\kappa$ = {point.kappa:.3g}", {"damping"}),
+    }
+    over = {plane.x.name, plane.y.name}
+    parts = [text for name, (text, also) in held.items() if name not in over and not also & over]
+    head = "open loop" if plane.structure is None else plane.structure.name
+    return f"{head}: {', '.join(parts)}"
+
+
+def draw_strips(
+    ax: Axes, polygons: list[FloatArray], colour: str, label: str, alpha: float = 0.25
+) -> None:
+    """Shade a set of polygons as one."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if not polygons:
+        return
+    # One compound path, so that neighbours that share an edge are not painted twice there.
+    path = Path.make_compound_path(
+        *(Path(_anticlockwise(p), closed=True) for p in closed(polygons))
+    )
+    ax.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", alpha=alpha, label=label))
+
+
+def closed(polygons: list[FloatArray]) -> list[FloatArray]:
+    """Return polygons with their first corner repeated at the end."""
+    return [np.vstack([polygon, polygon[:1]]) for polygon in polygons]
+
+
+def _anticlockwise(polygon: FloatArray) -> FloatArray:
+    x, y = polygon.T
+    twice = float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
+    return polygon if twice >= 0.0 else polygon[::-1]
+
+
+def draw_curves(
+    ax: Axes, curves: tuple[Curve, ...], colour: str, label: str, style: str = "-"
+) -> None:
+    """Draw boundary curves under one legend entry."""
+    for curve in curves:
+        points = np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
+        ax.plot(
+            points[:, 0], points[:, 1], style, color=colour, linewidth=1.4, label=label, zorder=3
+        )
+        label = "_nolegend_"
+
+
+def plot_chart(chart: StabilityChart, ax: Axes | None = None) -> Axes:
+    """Draw one chart: the stable set shaded, the boundary by the frequency that rules it.
+
+    Parameters
+    ----------
+    chart : StabilityChart
+        Of `chart`.
+    ax : Axes, optional
+        By default new ones.
+    """
+    from matplotlib.collections import LineCollection
+
+    ax = new_axes() if ax is None else ax
+    word = "stable" if chart.level == 0.0 else f"all roots left of {chart.level:g}"
+    draw_strips(ax, stable_strips(chart.lines, rows=chart.rows), BLUE, word)
+    pieces, speeds = [], []
+    for curve in chart.curves:
+        steps = np.stack([curve.points[:-1], curve.points[1:]], axis=1)
+        pieces.append(steps)
+        speeds.append(np.maximum(curve.omega[:-1], curve.omega[1:]))
+    if pieces:
+        drawn = LineCollection(
+            list(np.concatenate(pieces)), cmap="cividis", linewidths=2.2, zorder=3
+        )
+        drawn.set_array(np.concatenate(speeds))
+        ax.add_collection(drawn, autolim=False)
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if chart.plane.rig_point else 0.02)
+        bar.set_label("frequency of the crossing root, |Im s|")
+    _label_regions(ax, chart)
+    label_axes(ax, chart.plane)
+    ax.set_title(plane_title(chart.plane), fontsize="medium")
+    counted = "unstable roots" if chart.level == 0.0 else "roots farther right"
+    ax.legend(loc="best", fontsize="small", title=f"numbers: {counted}", title_fontsize="small")
+    return ax
+
+
+def _label_regions(ax: Axes, chart: StabilityChart) -> None:
+    """Write the number of unstable roots into the larger regions."""
+    whole = chart.plane.x.span * chart.plane.y.span
+    for region in chart.regions:
+        if region.unstable_roots and region.area > 0.02 * whole:
+            ax.annotate(
+                str(region.unstable_roots),
+                (region.x, region.y),
+                ha="center",
+                va="center",
+                fontsize="small",
+                color=GREY,
+            )
+
+
+def plot_charts(
+    charts: Mapping[str, StabilityChart | StabilisableChart], ax: Axes | None = None
+) -> Axes:
+    """Compare charts over the same axes: structures, rocks, dampings or decay rates.
+
+    Parameters
+    ----------
+    charts : mapping of str to StabilityChart or StabilisableChart
+        By the label in the legend; all over the same two parameters.
+    ax : Axes, optional
+        By default new ones.
+    """
+    ax = new_axes() if ax is None else ax
+    palette = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
+    for rank, (label, chart) in enumerate(charts.items()):
+        colour, style = palette[rank % len(palette)], STYLES[rank % len(STYLES)]
+        strips = stable_strips(chart.lines, rows=chart.rows)
+        draw_strips(ax, strips, colour, "_nolegend_", alpha=0.10)
+        draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.5g})", style)
+    if charts:
+        label_axes(ax, next(iter(charts.values())).plane)
+    # Above the axes: shaded sets leave no free corner. A twin axis needs its room first.
+    twin = any(
+        chart.plane.rig_point is not None and chart.plane.x.name == "omega0"
+        for chart in charts.values()
+    )
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.15 if twin else 1.01),
+        fontsize="small",
+        title="stable inside the shading",
+        title_fontsize="small",
+        frameon=False,
+    )
+    return ax

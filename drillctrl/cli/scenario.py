@@ -1,0 +1,221 @@
+"""How a run starts, what changes on the way and what closes the loop, as texts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.cli.gains import read_gains
+
+if TYPE_CHECKING:
+    from drillctrl.base.units import Dimension
+    from drillctrl.drilling.point import OperatingPoint
+    from drillctrl.drilling.rig import Rig
+    from drillctrl.simulation.controller import Controller
+    from drillctrl.simulation.scenario import Scenario
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+_CHANGE = (
+    "such as 't=50,omega0=9,duration=10' (omega0, v0, psi; of a rig: speed, rop, rock-strength)"
+)
+
+
+def controller_options(command: Command) -> Command:
+    """Add the options that say what closes the loop."""
+    options = [
+        click.option("--structure", help="p, case1, pd or case2; without it, no control."),
+        click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91."),
+        click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs."),
+        click.option(
+            "--table", type=click.Path(), help="Gains from a table that `drillctrl table` wrote."
+        ),
+        click.option("--activation", metavar="TIME", help="When control begins (default 0)."),
+        click.option(
+            "--delay", default="fixed", show_default=True,
+            help="Delayed outputs: fixed (τ0 ago) or current (τ ago).",
+        ),
+        click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
+        click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
+        click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
+        click.option("--limit", metavar="TORQUE", help="Largest |u|, such as 3 or '5 kN*m'."),
+        click.option(
+            "--rate-limit", type=float, help="Fastest change of u, per unit of time."
+        ),
+        click.option(
+            "--noise", default="", metavar="NAME=DEVIATION",
+            help="On each sample, such as theta=0.01,dtheta=0.1.",
+        ),
+        click.option("--seed", type=int, default=0, show_default=True, help="Of the noise."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
+    """Return numbers by name from a text such as ``dx=1,dtheta=1``; empty for none."""
+    numbers = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, _, value = part.partition("=")
+        try:
+            numbers[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(option, text, f"of the form {example}") from None
+    return numbers
+
+
+def read_quantity(option: str, text: str, dimension: Dimension, unit: float | None) -> float:
+    """Return a dimensionless number from one, or from a quantity where the rig's unit is known."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    from drillctrl.base import units
+
+    if unit is None:
+        raise InputError(option, text, "a dimensionless number, or a rig to go with its unit")
+    return units.to_si(option, text, dimension) / unit
+
+
+def read_time(option: str, text: str, rig: Rig | None) -> float:
+    """Return dimensionless time from a number, or from seconds of a rig."""
+    from drillctrl.base import units
+
+    return read_quantity(option, text, units.TIME, None if rig is None else rig.time_scale)
+
+
+def read_scenario(
+    start: str, initial: str, changes: tuple[str, ...], point: OperatingPoint, rig: Rig | None
+) -> Scenario:
+    """Return how a run starts and what changes.
+
+    Raises
+    ------
+    InputError
+        If a text has not the form it should have.
+    """
+    from drillctrl.simulation.scenario import Scenario
+
+    return Scenario(
+        start,
+        read_numbers("--initial", initial, "dx=1,dtheta=1"),
+        tuple(_read_change(text, point, rig) for text in changes),
+    )
+
+
+def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:
+    from drillctrl.base import units
+    from drillctrl.simulation.scenario import Change
+
+    given: dict[str, str] = {}
+    for part in text.split(","):
+        name, equals, value = part.partition("=")
+        if not equals or name.strip() in given:
+            raise InputError("--change", text, _CHANGE)
+        given[name.strip()] = value.strip()
+    if "t" not in given:
+        raise InputError("--change", text, _CHANGE)
+    arguments = {"time": read_time("--change t", given.pop("t"), rig)}
+    in_rig_units: dict[str, tuple[str, Dimension, float]] = {}
+    if rig is not None:
+        in_rig_units = {
+            "speed": ("omega0", units.ROTARY_SPEED, 1.0 / rig.time_scale),
+            "rop": ("penetration_rate", units.SPEED, rig.axial_scale / rig.time_scale),
+            "rock-strength": ("psi", units.STRESS, rig.rock_strength / point.psi),
+        }
+    plain = {"omega0": "omega0", "v0": "penetration_rate", "psi": "psi"}
+    for name, value in given.items():
+        if name == "duration":
+            arguments["duration"] = read_time("--change duration", value, rig)
+        elif name in in_rig_units:
+            field, dimension, unit = in_rig_units[name]
+            arguments[field] = units.to_si(f"--change {name}", value, dimension) / unit
+        elif name in plain:
+            arguments[plain[name]] = read_numbers("--change", f"{name}={value}", _CHANGE)[name]
+        else:
+            raise InputError("--change", text, _CHANGE)
+    return Change(**arguments)
+
+
+def read_controller(
+    options: Mapping[str, Any],
+    point: OperatingPoint,
+    scenario: Scenario,
+    duration: float,
+    rig: Rig | None,
+) -> Controller | None:
+    """Return what closes the loop, or None where nothing does.
+
+    Raises
+    ------
+    InputError
+        If an option is missing, or one is given that needs another.
+    """
+    from drillctrl.base import units
+
+    given: dict[str, Any] = {}
+    for name in ("activation", "period", "measurement_delay", "actuator_lag"):
+        if options[name] is not None:
+            option = f"--{name.replace('_', '-')}"
+            given[name] = read_time(option, options[name], rig)
+    if options["limit"] is not None:
+        unit = None if rig is None else rig.torsional_stiffness
+        given["limit"] = read_quantity("--limit", options["limit"], units.TORQUE, unit)
+    if options["rate_limit"] is not None:
+        given["rate_limit"] = options["rate_limit"]
+    if options["noise"]:
+        given["noise"] = read_numbers("--noise", options["noise"], "theta=0.01,dtheta=0.1")
+        given["seed"] = options["seed"]
+    if options["delay"] != "fixed":
+        given["delay"] = options["delay"]
+    structure, now, past = (options[name] for name in ("structure", "k1", "k2"))
+    if options["table"] is not None:
+        for name, value in (("structure", structure), ("K1", now), ("K2", past)):
+            if value is not None:
+                raise InputError(f"--{name}", value, "left out where --table gives the gains")
+        return _from_table(options["table"], point, scenario, duration, given)
+    if structure is None:
+        lonely = {"K1": now, "K2": past, **given}
+        for name, value in lonely.items():
+            if value is not None:
+                needs = f"given together with --{name.replace('_', '-')}"
+                raise InputError("--structure", "(missing)", needs)
+        return None
+    from drillctrl.simulation.controller import Controller
+
+    K1 = read_gains("K1", now)
+    if K1 is None:
+        raise InputError("--K1", "(missing)", f"given for structure {structure}")
+    return Controller(structure, K1, read_gains("K2", past), **given)
+
+
+def _from_table(
+    path: str, point: OperatingPoint, scenario: Scenario, duration: float, given: dict[str, Any]
+) -> Controller:
+    from drillctrl.tables.files import load_table
+    from drillctrl.tables.scheduling import course, scheduled
+
+    table = load_table(path)
+    ends = [change.time + change.duration for change in scenario.changes]
+    instants = [0.0, *(end for end in ends if end <= duration)]
+    import numpy as np
+
+    places = course(point, scenario, np.array(instants) + 2e-9)
+    vouched = table.stable_at(*places.T)
+    for stable, time, place in zip(vouched, instants, places.tolist(), strict=True):
+        if not stable:
+            omega0, delta0, psi = place
+            click.echo(
+                f"drillctrl: note: the table does not vouch for ω0 = {omega0:.4g}, "
+                f"δ0 = {delta0:.4g}, ψ = {psi:.4g} from t = {time:g}",
+                err=True,
+            )
+    return scheduled(table, point, scenario, duration=duration, **given)
+
+
+def read_duration(text: str, rig: Rig | None) -> float:
+    """Return the dimensionless length of a run."""
+    return checked_number("duration", read_time("--duration", text, rig), 0.0, open_low=True)

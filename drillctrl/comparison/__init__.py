@@ -1,1 +1,0 @@
-"""Feedback structures side by side on one set of measures."""

@@ -1,0 +1,1 @@
+"""Delay systems and the feedback that closes a loop around them."""

@@ -1,0 +1,362 @@
+"""Output-feedback structures u = K1 Y(t) + K2 Y(t − τ0) (Eqs. 36-40), and closing the loop."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.system import DelaySystem
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+ANGLE_BOUND = 10.0
+RATE_BOUND = 5.0
+
+
+@dataclass(frozen=True)
+class Tie:
+    """One gain that follows another: ``gain`` = ``factor`` · ``leader``.
+
+    Attributes
+    ----------
+    gain, leader : str
+        Names such as ``K2_1``; the leader is itself not tied.
+    factor : float
+        Not zero.
+    """
+
+    gain: str
+    leader: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class FeedbackStructure:
+    """Which outputs are fed back to which inputs, now and delayed, and within what bounds.
+
+    An entry of a gain matrix whose lower and upper bounds coincide is fixed, one that is
+    tied follows its leader; all others are free. The free gains, K1 before K2 and row by
+    row, form the gain vector.
+
+    Attributes
+    ----------
+    name : str
+        Name for summaries.
+    outputs : tuple of str
+        Names of the states that are measured, in the order of Y.
+    K1_lower, K1_upper : array, (m, p)
+        Bounds of the gains on Y(t).
+    K2_lower, K2_upper : array, (m, p)
+        Bounds of the gains on Y(t − τ).
+    inputs : tuple of str
+        Names of the inputs that are driven, m of them.
+    ties : tuple of Tie
+        Gains that follow others, within the bounds of both.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit, a bound is not finite, bounds are swapped, or a tie names no
+        free gain or leaves its leader no room.
+    """
+
+    name: str
+    outputs: tuple[str, ...]
+    K1_lower: FloatArray
+    K1_upper: FloatArray
+    K2_lower: FloatArray
+    K2_upper: FloatArray
+    inputs: tuple[str, ...] = ("torque",)
+    ties: tuple[Tie, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (len(self.inputs), len(self.outputs))
+        for field in ("K1_lower", "K1_upper", "K2_lower", "K2_upper"):
+            bound = np.array(getattr(self, field), dtype=float)
+            if bound.shape != shape:
+                raise InputError(field, f"array of shape {bound.shape}", f"of shape {shape}")
+            if not np.isfinite(bound).all():
+                raise InputError(field, bound.tolist(), "finite")
+            bound.setflags(write=False)
+            object.__setattr__(self, field, bound)
+        for gain in ("K1", "K2"):
+            low, high = getattr(self, f"{gain}_lower"), getattr(self, f"{gain}_upper")
+            if (low > high).any():
+                raise InputError(
+                    f"bound of {gain}",
+                    f"{low[low > high][0]:g}:{high[low > high][0]:g}",
+                    "given as lower:upper with lower ≤ upper",
+                )
+        self._check_ties()
+
+    def _check_ties(self) -> None:
+        """Refuse ties between gains that are not free, and leaders left without room."""
+        bounded = self.flat_lower < self.flat_upper
+        known = {n for n, free in zip(self.entry_names, bounded, strict=True) if free}
+        followers = {tie.gain for tie in self.ties}
+        for tie in self.ties:
+            for name in (tie.gain, tie.leader):
+                if name not in known:
+                    raise InputError("tie", name, f"one of the gains {', '.join(sorted(known))}")
+            if tie.leader in followers:
+                raise InputError("tie", tie.leader, "a leader that is not tied itself")
+            if checked_number(f"factor of the tie of {tie.gain}", tie.factor) == 0.0:
+                raise InputError(f"factor of the tie of {tie.gain}", 0.0, "not zero")
+        if len(followers) < len(self.ties):
+            raise InputError("ties", [tie.gain for tie in self.ties], "one for each gain")
+        for name, low, high in zip(self.gain_names, self.lower, self.upper, strict=True):
+            if low >= high:
+                raise InputError(f"bound {name}", f"{low:g}:{high:g}", "wider, with its ties")
+
+    @property
+    def flat_lower(self) -> FloatArray:
+        """Lower bounds of all entries of K1, then K2, row by row, shape (2 m p,)."""
+        return np.concatenate([self.K1_lower.ravel(), self.K2_lower.ravel()])
+
+    @property
+    def flat_upper(self) -> FloatArray:
+        """Upper bounds of all entries of K1, then K2, row by row, shape (2 m p,)."""
+        return np.concatenate([self.K1_upper.ravel(), self.K2_upper.ravel()])
+
+    @functools.cached_property
+    def entry_names(self) -> tuple[str, ...]:
+        """Names of all entries of K1, then K2: ``K1_1``, or ``K1_1_1`` with several inputs."""
+        rows, columns = self.K1_lower.shape
+        return tuple(
+            f"{gain}_{j + 1}" if rows == 1 else f"{gain}_{i + 1}_{j + 1}"
+            for gain in ("K1", "K2")
+            for i in range(rows)
+            for j in range(columns)
+        )
+
+    @functools.cached_property
+    def free(self) -> BoolArray:
+        """Which entries of (K1, K2), flattened, are free; shape (2 m p,)."""
+        followers = {tie.gain for tie in self.ties}
+        leads = [name not in followers for name in self.entry_names]
+        return np.asarray((self.flat_lower < self.flat_upper) & np.array(leads, dtype=bool))
+
+    @functools.cached_property
+    def gain_names(self) -> tuple[str, ...]:
+        """Names of the free gains in the order of the vector."""
+        return tuple(n for n, free in zip(self.entry_names, self.free, strict=True) if free)
+
+    @functools.cached_property
+    def spread(self) -> FloatArray:
+        """How each entry of (K1, K2), flattened, follows the gain vector, (2 m p, k)."""
+        names, columns = self.entry_names, self.gain_names
+        table = np.zeros((len(names), len(columns)))
+        for j, name in enumerate(columns):
+            table[names.index(name), j] = 1.0
+        for tie in self.ties:
+            table[names.index(tie.gain), columns.index(tie.leader)] = tie.factor
+        return table
+
+    @functools.cached_property
+    def fixed(self) -> FloatArray:
+        """The fixed entries of (K1, K2), flattened; 0 where an entry is free or tied."""
+        return np.where(self.flat_lower < self.flat_upper, 0.0, self.flat_lower)
+
+    @functools.cached_property
+    def lower(self) -> FloatArray:
+        """Lower bounds of the gain vector, those of tied gains included, shape (k,)."""
+        return self._limits()[0]
+
+    @functools.cached_property
+    def upper(self) -> FloatArray:
+        """Upper bounds of the gain vector, those of tied gains included, shape (k,)."""
+        return self._limits()[1]
+
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        table = self.spread
+        low, high = self.flat_lower[:, None], self.flat_upper[:, None]
+        acts = table != 0.0
+        factor = np.where(acts, table, 1.0)
+        ends = np.sort(np.stack([low / factor, high / factor]), axis=0)
+        return (
+            np.where(acts, ends[0], -np.inf).max(axis=0),
+            np.where(acts, ends[1], np.inf).min(axis=0),
+        )
+
+    def gains(self, vector: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return K1 and K2, each (m, p), from a vector of the free gains."""
+        flat = self.fixed + self.spread @ np.asarray(vector, dtype=float)
+        half = flat.size // 2
+        shape = self.K1_lower.shape
+        return flat[:half].reshape(shape), flat[half:].reshape(shape)
+
+    def vector(self, K1: npt.ArrayLike, K2: npt.ArrayLike) -> FloatArray:
+        """Return the vector of the free gains in given matrices, the inverse of `gains`."""
+        flat = np.concatenate([np.ravel(K1), np.ravel(K2)])
+        return np.asarray(flat[self.free], dtype=float)
+
+    def with_bounds(self, bounds: Mapping[str, tuple[float, float]]) -> FeedbackStructure:
+        """Return the structure with other bounds.
+
+        Parameters
+        ----------
+        bounds : mapping
+            From ``"K1"`` or ``"K2"`` (all free gains of that matrix) or a name among
+            `gain_names` to (lower, upper). Single gains overrule whole matrices.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or bounds are swapped or not finite.
+        """
+        arrays = [self.flat_lower, self.flat_upper]
+        positions = dict(zip(self.gain_names, np.flatnonzero(self.free), strict=True))
+        for key in sorted(bounds, key=len):
+            low, high = bounds[key]
+            where = [
+                i for name, i in positions.items() if name == key or name.startswith(key + "_")
+            ]
+            if not where:
+                known = ", ".join(("K1", "K2", *self.gain_names))
+                raise InputError("bound", key, f"on one of the gains {known}")
+            if checked_number(f"bound {key}", low) > checked_number(f"bound {key}", high):
+                raise InputError(f"bound {key}", f"{low:g}:{high:g}", "lower:upper, lower ≤ upper")
+            arrays[0][where], arrays[1][where] = low, high
+        half, shape = arrays[0].size // 2, self.K1_lower.shape
+        return replace(
+            self,
+            K1_lower=arrays[0][:half].reshape(shape),
+            K1_upper=arrays[1][:half].reshape(shape),
+            K2_lower=arrays[0][half:].reshape(shape),
+            K2_upper=arrays[1][half:].reshape(shape),
+        )
+
+
+def _torque_structure(name: str, bounds: Sequence[float], *, delayed: bool) -> FeedbackStructure:
+    box = np.array([bounds])
+    past = box if delayed else np.zeros_like(box)
+    outputs = ("theta", "dtheta")[: len(bounds)]
+    return FeedbackStructure(name, outputs, -box, box, -past, past)
+
+
+def preset_structure(name: str) -> FeedbackStructure:
+    """Return a preset structure with the paper's bounds (Eqs. 37, 39, 43).
+
+    Parameters
+    ----------
+    name : str
+        ``"p"``: θ; ``"case1"``: θ and delayed θ; ``"pd"``: θ and θ';
+        ``"case2"``: θ and θ', both also delayed.
+
+    Raises
+    ------
+    InputError
+        If there is no such preset.
+    """
+    presets = {
+        "p": ((ANGLE_BOUND,), False),
+        "case1": ((ANGLE_BOUND,), True),
+        "pd": ((ANGLE_BOUND, RATE_BOUND), False),
+        "case2": ((ANGLE_BOUND, RATE_BOUND), True),
+    }
+    if name not in presets:
+        raise InputError("structure", name, f"one of {', '.join(presets)}")
+    bounds, delayed = presets[name]
+    return _torque_structure(name, bounds, delayed=delayed)
+
+
+STRUCTURE_NAMES = ("p", "case1", "pd", "case2")
+
+
+def gain_matrices(
+    feedback: FeedbackStructure, K1: npt.ArrayLike, K2: npt.ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return K1 and K2 as (m, p) arrays from flat lists, checked against the structure.
+
+    Gains outside the structure's bounds are permitted; they bind the design only.
+
+    Raises
+    ------
+    InputError
+        If a gain is missing, not finite, or not zero where the structure has none.
+    """
+    shape = feedback.K1_lower.shape
+    matrices = []
+    for name, given in (("K1", K1), ("K2", K2)):
+        try:
+            flat = np.atleast_1d(np.asarray(0.0 if given is None else given, dtype=float)).ravel()
+        except (TypeError, ValueError):
+            raise InputError(name, repr(given), "a list of numbers") from None
+        if given is None:
+            flat = np.zeros(shape).ravel()
+        if flat.size != shape[0] * shape[1]:
+            count = shape[0] * shape[1]
+            raise InputError(name, flat.tolist(), f"{count} gain(s), one for each output")
+        if not np.isfinite(flat).all():
+            raise InputError(name, flat.tolist(), "finite")
+        matrices.append(flat.reshape(shape))
+    unused = (feedback.K2_lower.ravel() == 0.0) & (feedback.K2_upper.ravel() == 0.0)
+    if matrices[1].ravel()[unused].any():
+        raise InputError("K2", matrices[1].ravel().tolist(), f"0 for structure {feedback.name}")
+    return matrices[0], matrices[1]
+
+
+def close_loop(
+    system: DelaySystem,
+    feedback: FeedbackStructure,
+    K1: npt.ArrayLike,
+    K2: npt.ArrayLike | None = None,
+    delay: float | None = None,
+) -> DelaySystem:
+    """Close the loop: A0 + B K1 C and Aτ + B K2 C (Eq. 40).
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        Names the outputs and the inputs.
+    K1, K2 : array_like, (m, p) or flat
+        Gains on Y(t) and on Y(t − delay).
+    delay : float, optional
+        Delay of the fed-back signals; by default the largest delay of the plant.
+
+    Returns
+    -------
+    DelaySystem
+        The same states, inputs and outputs; u is what is added to the feedback.
+    """
+    now, past = gain_matrices(feedback, K1, K2)
+    drive, measure = loop_channels(system, feedback)
+    delay = system.max_delay if delay is None else checked_number("delay", delay, 0.0)
+    matrices = dict(zip(system.delays, system.delayed, strict=True))
+    if past.any():
+        matrices[delay] = system.delayed_matrix(delay) + drive @ past @ measure
+    delays = tuple(sorted(matrices))
+    return replace(
+        system,
+        A0=system.A0 + drive @ now @ measure,
+        delayed=tuple(matrices[tau] for tau in delays),
+        delays=delays,
+    )
+
+
+def loop_channels(
+    system: DelaySystem, feedback: FeedbackStructure
+) -> tuple[FloatArray, FloatArray]:
+    """Return the columns of B and the rows of C that a structure uses.
+
+    Raises
+    ------
+    InputError
+        If the plant has no such input or output.
+    """
+    for name in feedback.inputs:
+        if name not in system.input_names:
+            raise InputError("input", name, f"one of {', '.join(system.input_names)}")
+    for name in feedback.outputs:
+        if name not in system.output_names:
+            raise InputError("output", name, f"one of {', '.join(system.output_names)}")
+    columns = [system.input_names.index(name) for name in feedback.inputs]
+    rows = [system.output_names.index(name) for name in feedback.outputs]
+    return system.B[:, columns], system.C[rows]

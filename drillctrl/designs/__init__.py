@@ -1,0 +1,1 @@
+"""Designs of feedback gains, what is said of them and what else would help."""

@@ -1,0 +1,183 @@
+"""`design` and `analyze`: from an operating point to gains and what is known of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.delay.structure import FeedbackStructure, gain_matrices, preset_structure
+from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.designs.loop_analysis import DEFAULT_ORDER
+from drillctrl.designs.result import Design, Subject, assess
+from drillctrl.drilling.plant import Plant
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.synthesis import problem
+from drillctrl.synthesis.family import LoopFamily, loop_family
+from drillctrl.synthesis.objectives import (
+    EXACT,
+    NO_REQUIREMENTS,
+    Objective,
+    Requirements,
+    WorstCase,
+)
+
+Where = OperatingPoint | RigPoint | DelaySystem
+
+
+def _as_structure(given: str | FeedbackStructure) -> FeedbackStructure:
+    return preset_structure(given) if isinstance(given, str) else given
+
+
+def _subject(where: Where, inputs: tuple[str, ...], physics: Plant | None) -> Subject:
+    if isinstance(where, DelaySystem):
+        if physics is not None:
+            raise InputError("plant", "given", "left out beside a DelaySystem")
+        return Subject(where, None, None, None)
+    if isinstance(where, RigPoint):
+        point, rig_point = where.operating_point(), where
+    elif isinstance(where, OperatingPoint):
+        point, rig_point = where, None
+    else:
+        kinds = "an OperatingPoint, a RigPoint or a DelaySystem"
+        raise InputError("point", type(where).__name__, kinds)
+    return Subject(plant_system(point, inputs, physics), point, rig_point, physics)
+
+
+def design(
+    point: Where,
+    structure: str | FeedbackStructure = "case1",
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    objective: Objective = EXACT,
+    requirements: Requirements = NO_REQUIREMENTS,
+    plant: Plant | None = None,
+    seed: int = 0,
+) -> Design:
+    """Design bounded gains that minimise the spectral abscissa of the closed loop.
+
+    Parameters
+    ----------
+    point : OperatingPoint, RigPoint or DelaySystem
+        Where the rig drills; or any linear plant.
+    structure : str or FeedbackStructure
+        A preset (``"p"``, ``"case1"``, ``"pd"``, ``"case2"``) or a structure.
+    bounds : mapping, optional
+        Bounds that replace those of the structure; see `FeedbackStructure.with_bounds`.
+    objective : Exact, SemiDiscrete, WorstCase or Robust
+        What to minimise instead of the spectral abscissa.
+    requirements : Requirements
+        What must hold beside the bounds.
+    plant : Plant, optional
+        Physics other than those of `dimensionless_plant`, with the same parameters.
+    seed : int
+        Of the starting points. The same seed gives the same gains.
+
+    Returns
+    -------
+    Design
+        The best gains found, whether or not they stabilise and meet the requirements: look
+        at ``stable`` and ``requirements_met``.
+
+    Raises
+    ------
+    InputError
+        If the structure does not fit the plant, a bound is wrong, or a worst case is asked
+        for without an operating point.
+    """
+    began = time.perf_counter()
+    chosen = _as_structure(structure).with_bounds(bounds or {})
+    checked_integer("seed", seed, 0, 2**63 - 1)
+    subject = _subject(point, chosen.inputs, plant)
+    family = loop_family(subject.plant, chosen)
+    others = []
+    if isinstance(objective, WorstCase):
+        if subject.point is None:
+            raise InputError("objective", objective.name, "used with an operating point")
+        for other in objective.around(subject.point)[1:]:
+            others.append(loop_family(plant_system(other, chosen.inputs, plant), chosen))
+    solution = problem.solve(family, objective, requirements, others, seed)
+    result = assess(subject, chosen, *chosen.gains(solution.gains))
+    alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
+    value = problem.reported_value(family, objective, solution.gains)
+    return replace(
+        result,
+        objective=objective,
+        objective_value=max([result.spectral_abscissa if value is None else value, *alphas]),
+        requirements=requirements,
+        requirements_met=_meets(result, requirements, family, solution.gains),
+        optimality=solution.optimality,
+        evaluations=solution.evaluations,
+        elapsed_seconds=time.perf_counter() - began,
+    )
+
+
+def _meets(
+    result: Design, requirements: Requirements, family: LoopFamily, gains: FloatArray
+) -> bool:
+    """Whether a design fulfils what was required, by exact abscissa and guaranteed radius."""
+    wanted = requirements.decay, requirements.stability_radius, requirements.input_gain
+    decay, radius, peak = wanted
+    return (
+        (decay is None or result.spectral_abscissa + result.loop.abscissa_error <= -decay)
+        and (radius is None or result.stability_radius.value >= radius)
+        and (peak is None or (result.stable and problem.input_gain(family, gains) <= peak))
+    )
+
+
+def analyze(
+    point: Where,
+    structure: str | FeedbackStructure | None = None,
+    K1: npt.ArrayLike | None = None,
+    K2: npt.ArrayLike | None = None,
+    *,
+    m: int | None = None,
+    order: int = DEFAULT_ORDER,
+    plant: Plant | None = None,
+) -> Design:
+    """Analyse given gains, or the open loop.
+
+    Parameters
+    ----------
+    point : OperatingPoint, RigPoint or DelaySystem
+        Where the rig drills; or any linear plant.
+    structure : str or FeedbackStructure, optional
+        Without it, the open loop.
+    K1, K2 : array_like, optional
+        Gains in the order of the outputs; K2 may be left out where nothing delayed is fed
+        back.
+    m, order : int, optional
+        Of the semi-discretisation that is reported; see `semidiscretize`.
+    plant : Plant, optional
+        Physics other than those of `dimensionless_plant`.
+
+    Raises
+    ------
+    InputError
+        If gains are missing, too many, or not finite.
+    """
+    began = time.perf_counter()
+    if structure is None:
+        if K1 is not None or K2 is not None:
+            raise InputError("structure", "(missing)", "given together with gains")
+        none = np.zeros((0, 0))
+        result = assess(_subject(point, ("torque",), plant), None, none, none, m, order)
+    else:
+        chosen = _as_structure(structure)
+        if K1 is None:
+            raise InputError("K1", "(missing)", f"given for structure {chosen.name}")
+        if K2 is None and (chosen.K2_upper.any() or chosen.K2_lower.any()):
+            raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
+        gains = gain_matrices(chosen, K1, K2)
+        result = assess(_subject(point, chosen.inputs, plant), chosen, *gains, m, order)
+    result = replace(result, elapsed_seconds=time.perf_counter() - began)
+    if m is not None or order != DEFAULT_ORDER:
+        # Refused now rather than when it is read.
+        _ = result.spectral_radius
+    return result

@@ -1,0 +1,173 @@
+"""What would stabilise a point that no gains found do: other structures, another speed."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drillctrl.delay.structure import STRUCTURE_NAMES, FeedbackStructure, preset_structure
+from drillctrl.delay.system import plant_system
+from drillctrl.designs.design import analyze, design
+from drillctrl.designs.result import Design
+from drillctrl.drilling.plant import dimensionless_plant
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.structures import feed
+from drillctrl.spectrum.roots import spectral_abscissa
+
+# How much faster the bit is let turn, and in how many steps that is looked at.
+_FASTEST = 4.0
+_STEPS = 40
+_BISECTIONS = 30
+
+_Range = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Remedy:
+    """Something that stabilises where a design did not.
+
+    Attributes
+    ----------
+    kind : {"structure", "feed", "speed"}
+        Other torque feedback; an axial actuator; faster rotation without feedback.
+    name : str
+        Of the structure; ``"none"`` for rotation alone.
+    design : Design
+        The stable loop, with its point and gains.
+    """
+
+    kind: str
+    name: str
+    design: Design
+
+    @property
+    def spectral_abscissa(self) -> float:
+        """α of the stable loop."""
+        return self.design.spectral_abscissa
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the JSON fields."""
+        found = self.design
+        assert found.point is not None
+        return {
+            "kind": self.kind,
+            "structure": None if self.kind == "speed" else self.name,
+            "omega0": found.point.omega0,
+            "delta0": found.point.delta0,
+            "K1": found.K1.ravel().tolist(),
+            "K2": found.K2.ravel().tolist(),
+            "spectral_abscissa": found.spectral_abscissa,
+        }
+
+
+def remedies(failed: Design) -> tuple[Remedy, ...]:
+    """Return what stabilises the point of a design that is not stable.
+
+    Tried are the presets that allow more than the structure, within the paper's bounds, the
+    feed alone and beside the structure, and faster rotation at the same rate of penetration
+    without feedback. Each that is returned has been designed and its roots counted; that one is
+    missing proves nothing.
+
+    Parameters
+    ----------
+    failed : Design
+        Of a point.
+
+    Returns
+    -------
+    tuple of Remedy
+        In the order in which they are easy to have; empty for a stable design, a design that
+        is not of an operating point, and where nothing that was tried helps.
+    """
+    if failed.stable or failed.point is None or failed.structure is None:
+        return ()
+    where = failed.point if failed.rig_point is None else failed.rig_point
+    found: list[Remedy] = []
+    for kind, candidate in _candidates(failed):
+        if kind == "structure" and any(remedy.kind == kind for remedy in found):
+            # The presets become richer: the first that stabilises is the simplest.
+            continue
+        result = design(where, candidate, plant=failed.physics)
+        if result.stable:
+            found.append(Remedy(kind, candidate.name, result))
+    faster = _stable_speed(failed)
+    return tuple(found) if faster is None else (*found, Remedy("speed", "none", faster))
+
+
+def _candidates(failed: Design) -> Iterator[tuple[str, FeedbackStructure]]:
+    """Yield structures to try, those with few gains first."""
+    structure = failed.structure
+    assert structure is not None
+    if "torque" in structure.inputs:
+        for name in STRUCTURE_NAMES:
+            preset = preset_structure(name)
+            if _offers_more(preset, structure):
+                yield "structure", preset
+    physics = dimensionless_plant() if failed.physics is None else failed.physics
+    if "axial" in structure.inputs or "axial" not in physics.input_names:
+        return
+    yield "feed", feed()
+    if not structure.ties and not {"x", "dx"} & set(structure.outputs):
+        yield "feed", feed(structure)
+
+
+def _offers_more(candidate: FeedbackStructure, structure: FeedbackStructure) -> bool:
+    """Whether a candidate permits every gain of the structure and further ones."""
+    old, new = _ranges(structure), _ranges(candidate)
+    nothing = (0.0, 0.0)
+    keys = old.keys() | new.keys()
+    pairs = [(old.get(key, nothing), new.get(key, nothing)) for key in keys]
+    covers = all(b[0] <= a[0] and a[1] <= b[1] for a, b in pairs)
+    return covers and any(a != b for a, b in pairs)
+
+
+def _ranges(structure: FeedbackStructure) -> dict[tuple[str, str, str], _Range]:
+    """Return the bounds of each gain by matrix, input and output."""
+    return {
+        (matrix, input_name, output): (
+            float(getattr(structure, f"{matrix}_lower")[i, j]),
+            float(getattr(structure, f"{matrix}_upper")[i, j]),
+        )
+        for matrix in ("K1", "K2")
+        for i, input_name in enumerate(structure.inputs)
+        for j, output in enumerate(structure.outputs)
+    }
+
+
+def _stable_speed(failed: Design) -> Design | None:
+    """Return the open loop at the lowest higher speed found at which it is stable."""
+    point = failed.point
+    assert point is not None
+
+    def at(factor: float) -> OperatingPoint:
+        # The same rate of penetration: a faster bit cuts less in each turn.
+        return point.with_changes(omega0=point.omega0 * factor, delta0=point.delta0 / factor)
+
+    def alpha(factor: float) -> float:
+        return spectral_abscissa(plant_system(at(factor), (), failed.physics))
+
+    factors = np.geomspace(1.0, _FASTEST, _STEPS + 1).tolist()
+    for low, high in itertools.pairwise(factors):
+        if alpha(high) >= 0.0:
+            continue
+        unstable, stable = low, high
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (unstable + stable)
+            unstable, stable = (unstable, middle) if alpha(middle) < 0.0 else (middle, stable)
+        # On the stable side of the boundary by a thousandth, if that is still stable.
+        beyond = stable * (1.0 + 1e-3)
+        chosen = beyond if beyond <= high and alpha(beyond) < 0.0 else high
+        result = analyze(_with_rig(failed, at(chosen), chosen), plant=failed.physics)
+        return result if result.stable else None
+    return None
+
+
+def _with_rig(failed: Design, point: OperatingPoint, factor: float) -> OperatingPoint | RigPoint:
+    """Return the faster point as a rig point where the design was for one."""
+    rig_point = failed.rig_point
+    if rig_point is None:
+        return point
+    return replace(rig_point, rotary_speed=rig_point.rotary_speed * factor)

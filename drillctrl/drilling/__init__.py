@@ -1,0 +1,1 @@
+"""The drilling rig: its parameters, points, physics and feedback structures."""

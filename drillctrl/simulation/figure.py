@@ -1,0 +1,222 @@
+"""Figures of simulated motions. Each takes matplotlib Axes, or makes them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctrl.base.errors import InputError
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
+from drillctrl.simulation.result import Simulation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SIGNALS = {
+    "x": "x",
+    "dx": "x'",
+    "theta": "θ",
+    "dtheta": "θ'",
+    "bit_speed": "bit speed ω0 + θ'",
+    "depth": "depth of cut",
+    "delay": "delay τ",
+    "weight_on_bit": "weight on bit",
+    "torque_on_bit": "torque on bit",
+    "axial": "axial control",
+    "torque": "control u",
+}
+PLANES = {"torsion": ("theta", "dtheta"), "axial": ("x", "dx")}
+_SHADES = (
+    ("stuck", "torsional stick", GREY, 0.3),
+    ("lost", "off the rock", "#56B4E9", 0.25),
+    ("saturated", "control at a limit", "#E69F00", 0.25),
+)
+_PER_STEP = 5
+_TIME = "dimensionless time t"
+
+
+def plot_motion(run: Simulation) -> Figure:
+    """Draw axial motion, bit speed and control over time; see `plot_signal`.
+
+    Parameters
+    ----------
+    run : Simulation
+        Of `simulate`.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = ["x", "bit_speed"]
+    if run.controller is not None:
+        inputs = run.controller.feedback.inputs  # type: ignore[union-attr]
+        names += [name for name in ("axial", "torque") if name in inputs]
+    figure = Figure(figsize=(7.2, 1.9 * len(names) + 0.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(names), 1, sharex=True)
+    for ax, name in zip(axes, names, strict=True):
+        plot_signal(run, name, ax)
+        ax.set_xlabel("")
+    handles, labels = axes[0].get_legend_handles_labels()
+    if handles:
+        axes[0].legend(handles, labels, loc="upper left", fontsize="small")
+    axes[-1].set_xlabel(_TIME)
+    axes[0].set_title(_title(run))
+    return figure
+
+
+def plot_signal(run: Simulation, name: str = "x", ax: Axes | None = None) -> Axes:
+    """Draw one signal over time, with what the bit and the controller are stopped by shaded.
+
+    Parameters
+    ----------
+    run : Simulation
+        Of `simulate`.
+    name : str
+        A key of `SIGNALS`.
+    ax : Axes, optional
+        By default new ones.
+    """
+    values, times = _signal(run, name)
+    ax = new_axes(7.2, 2.8) if ax is None else ax
+    for phase, label, colour, alpha in _SHADES:
+        for i, (start, end) in enumerate(run.phases(phase) if run.model == "nonlinear" else ()):
+            told = label if i == 0 else None
+            ax.axvspan(start, end, color=colour, alpha=alpha, linewidth=0, label=told)
+    colour = ORANGE if name in ("axial", "torque") else BLUE
+    ax.plot(times, values, color=colour, linewidth=0.9)
+    ax.set_xlabel(_TIME)
+    ax.set_ylabel(SIGNALS[name])
+    ax.margins(x=0)
+    return ax
+
+
+def plot_phase_portrait(
+    run: Simulation, plane: str = "torsion", ax: Axes | None = None, since: float = 0.0
+) -> Axes:
+    """Draw the motion in a plane of states, with what was before ``since`` thin and grey.
+
+    Parameters
+    ----------
+    run : Simulation
+        Of `simulate`.
+    plane : {"torsion", "axial"}
+        θ' over θ, or x' over x.
+    ax : Axes, optional
+        By default new ones.
+    since : float
+        Such as the time from which an orbit is closed.
+    """
+    if plane not in PLANES:
+        raise InputError("plane", plane, f"one of {', '.join(PLANES)}")
+    across, up = PLANES[plane]
+    ax = new_axes(5.2, 4.4) if ax is None else ax
+    motion = run.on_steps(_PER_STEP)
+    early = motion.times <= since
+    x, y = getattr(motion, across), getattr(motion, up)
+    if early.any():
+        ax.plot(x[early], y[early], color=GREY, alpha=0.5, linewidth=0.6, label="before")
+    late = motion.times >= since
+    ax.plot(x[late], y[late], color=BLUE, linewidth=1.1, label="motion" if early.any() else None)
+    halted, name = (
+        (motion.stuck, "torsional stick") if plane == "torsion" else (motion.held, "axial hold")
+    )
+    halted = halted & late
+    if halted.any():
+        ax.plot(
+            np.where(halted, x, np.nan), np.where(halted, y, np.nan), color=ORANGE,
+            linewidth=2.4, label=name,
+        )  # fmt: skip
+    end = run.at([run.times[-1]])
+    ax.plot(getattr(end, across), getattr(end, up), "o", color=GREEN, markersize=5, label="end")
+    ax.set_xlabel(SIGNALS[across])
+    ax.set_ylabel(SIGNALS[up])
+    ax.set_title(_title(run), fontsize="medium")
+    ax.legend(loc="best", fontsize="small")
+    return ax
+
+
+def plot_against_linear(
+    nonlinear: Simulation, linear: Simulation, name: str = "x", ax: Axes | None = None
+) -> Axes:
+    """Draw a signal of the nonlinear motion over that of the linear one.
+
+    Parameters
+    ----------
+    nonlinear, linear : Simulation
+        Of the same point, controller and disturbance. The linear motion is cut where it
+        grows beyond three times the range of the other.
+    name : str
+        A key of `SIGNALS`.
+    ax : Axes, optional
+        By default new ones.
+    """
+    ax = new_axes(7.2, 3.2) if ax is None else ax
+    values, times = _signal(nonlinear, name)
+    other, others = _signal(linear, name)
+    ax.plot(others, other, "--", color=ORANGE, linewidth=1.0, label="linear")
+    ax.plot(times, values, color=BLUE, linewidth=1.0, label="nonlinear")
+    low, high = float(values.min()), float(values.max())
+    reach = high - low
+    if other.min() < low - reach or other.max() > high + reach:
+        ax.set_ylim(low - reach, high + reach)
+    ax.set_xlabel(_TIME)
+    ax.set_ylabel(SIGNALS[name])
+    ax.margins(x=0)
+    ax.set_title(f"{SIGNALS[name]} at {_place(nonlinear)}", fontsize="medium")
+    ax.legend(loc="best", fontsize="small")
+    return ax
+
+
+def plot_rock_face(run: Simulation, time: float | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the rock that lies ahead of a blade over the next blade pitch.
+
+    Parameters
+    ----------
+    run : Simulation
+        Of the nonlinear model.
+    time : float, optional
+        The instant; by default the end of the run.
+    ax : Axes, optional
+        By default new ones.
+    """
+    ax = new_axes(6.4, 3.2) if ax is None else ax
+    when = float(run.times[-1]) if time is None else time
+    face = run.rock_face(when, 361)
+    degrees = np.degrees(face.angle)
+    bottom = min(float(face.height.min()), 0.0) - 0.2 * max(float(np.ptp(face.height)), 1e-9)
+    ax.fill_between(degrees, bottom, face.height, color=GREY, alpha=0.35, linewidth=0)
+    ax.plot(degrees, face.height, color="black", linewidth=1.0, label="rock face")
+    older = face.passes > 1
+    if older.any():
+        ax.plot(
+            degrees, np.where(older, face.height, np.nan), color=ORANGE, linewidth=2.0,
+            label="left by an earlier pass",
+        )  # fmt: skip
+    ax.axhline(0.0, color=BLUE, linestyle="--", linewidth=1.0, label="tip of the blade")
+    ax.set_xlabel("angle ahead of the blade (degrees)")
+    ax.set_ylabel("height above the tip")
+    ax.set_title(f"{_title(run)}, t = {when:.6g}", fontsize="medium")
+    ax.margins(x=0)
+    ax.set_ylim(bottom=bottom)
+    ax.legend(loc="best", fontsize="small")
+    return ax
+
+
+def _signal(run: Simulation, name: str) -> tuple[Any, Any]:
+    if name not in SIGNALS:
+        raise InputError("signal", name, f"one of {', '.join(SIGNALS)}")
+    motion = run.on_steps(_PER_STEP)
+    if name == "bit_speed":
+        return run.point.omega0 + motion.dtheta, motion.times
+    return getattr(motion, name), motion.times
+
+
+def _title(run: Simulation) -> str:
+    return f"{run.model.capitalize()} motion at {_place(run)}"
+
+
+def _place(run: Simulation) -> str:
+    p = run.point
+    return f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"

@@ -1,0 +1,295 @@
+"""`compare`: candidates at one operating point, measured alike and sorted."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.structure import FeedbackStructure, preset_structure
+from drillctrl.designs.design import analyze, design
+from drillctrl.designs.result import Design
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.studies.measures import LoopMargins, Response, basin, loop_margins, respond
+
+if TYPE_CHECKING:
+    from drillctrl.charts.chart import StabilityChart
+
+Given = tuple[str, str | FeedbackStructure, npt.ArrayLike, npt.ArrayLike | None]
+Progress = Callable[[str, int, int], None]
+
+OPEN_LOOP = "none"
+DISTURBANCE = {"dx": 1.0, "dtheta": 1.0}
+REGION = (("omega0", 0.5, 25.0), ("delta0", 0.0, 15.0))
+# Whether a larger value is the better one.
+SORTS = {
+    "spectral_abscissa": False,
+    "stability_radius": True,
+    "delay_margin": True,
+    "phase_margin": True,
+    "peak_sensitivity": False,
+    "max_abs_u": False,
+    "max_abs_x": False,
+    "settling_time": False,
+    "basin": True,
+    "stable_area": True,
+    "formation_change": True,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One candidate and its measures; None stands for what does not exist.
+
+    Attributes
+    ----------
+    label : str
+        Its name in the table.
+    design : Design
+        Its gains and linear analysis.
+    designed : bool
+        Whether the gains were designed here.
+    margins : LoopMargins or None
+        Of a stable loop with one input.
+    linear, nonlinear : Response or None
+        After the disturbance.
+    basin : float or None
+        Multiple of the disturbance that still settles; see `measures.basin`.
+    chart : StabilityChart or None
+        Where the same gains are stable.
+    area_ratio : float or None
+        Stable area over that of the open loop.
+    """
+
+    label: str
+    design: Design
+    designed: bool
+    margins: LoopMargins | None
+    linear: Response | None
+    nonlinear: Response | None
+    basin: float | None
+    chart: StabilityChart | None
+    area_ratio: float | None
+
+    @property
+    def formation_change(self) -> float | None:
+        """Smallest relative change of ψ, up or down, that destabilises; linear."""
+        margins = self.design.point_margins
+        return None if margins is None else min(margins["psi"].upper, -margins["psi"].lower)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of a row."""
+        from drillctrl.studies.comparison_export import row_fields
+
+        return row_fields(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Candidates side by side.
+
+    Attributes
+    ----------
+    point : OperatingPoint or RigPoint
+        Where they were compared.
+    rows : tuple of Row
+        Best first by ``sort``; those without the measure last.
+    sort : str
+        One of `SORTS`.
+    disturbance : mapping
+        What the responses follow: a perturbation of steady drilling at t = 0.
+    duration : float
+        Length of the simulations.
+    elapsed_seconds : float
+        Wall time.
+    """
+
+    point: OperatingPoint | RigPoint
+    rows: tuple[Row, ...]
+    sort: str
+    disturbance: Mapping[str, float]
+    duration: float
+    elapsed_seconds: float
+
+    def summary(self) -> str:
+        """Return the table and what better costs, for people."""
+        from drillctrl.studies.comparison_text import comparison_text
+
+        return comparison_text(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of the command line."""
+        from drillctrl.studies.comparison_export import comparison_fields
+
+        return comparison_fields(self)
+
+    def to_csv(self) -> str:
+        """Return one line a candidate."""
+        from drillctrl.studies.comparison_export import comparison_csv
+
+        return comparison_csv(self)
+
+    def to_html(self) -> str:
+        """Return one page with the table and the figures in it.
+
+        Raises
+        ------
+        InputError
+            If jinja2 is not installed.
+        """
+        from drillctrl.studies.compare_page import comparison_html
+
+        return comparison_html(self)
+
+    def __repr__(self) -> str:
+        names = ", ".join(row.label for row in self.rows)
+        return f"<Comparison of {names}, by {self.sort}>"
+
+
+def _subjects(
+    point: OperatingPoint | RigPoint,
+    structures: Sequence[str | FeedbackStructure],
+    given: Sequence[Given],
+    bounds: Mapping[str, tuple[float, float]] | None,
+    tell: Callable[[str], None],
+) -> list[tuple[str, Design, bool]]:
+    """Design and analyse the candidates, the open loop first."""
+    subjects = [(OPEN_LOOP, analyze(point), False)]
+    designed = [preset_structure(s) if isinstance(s, str) else s for s in structures]
+    known = dict.fromkeys(name for chosen in designed for name in chosen.entry_names)
+    for name in bounds or {}:
+        if name not in ("K1", "K2", *known):
+            raise InputError("bound", name, f"on one of K1, K2, {', '.join(known)}")
+    for chosen in designed:
+        tell(f"design of {chosen.name}")
+        mine = {
+            name: limits
+            for name, limits in (bounds or {}).items()
+            if name in ("K1", "K2") or name in chosen.entry_names
+        }
+        subjects.append((chosen.name, design(point, chosen, bounds=mine), True))
+    for label, structure, K1, K2 in given:
+        tell(f"analysis of {label}")
+        subjects.append((label, analyze(point, structure, K1, K2), False))
+    labels = [label for label, _, _ in subjects]
+    if len(set(labels)) < len(labels):
+        raise InputError("structures", labels[1:], f"different names, none of them {OPEN_LOOP}")
+    return subjects
+
+
+def compare(
+    point: OperatingPoint | RigPoint,
+    structures: Sequence[str | FeedbackStructure] = ("p", "case1", "pd", "case2"),
+    *,
+    given: Sequence[Given] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    disturbance: Mapping[str, float] | None = None,
+    duration: float = 200.0,
+    region: tuple[tuple[str, float, float], tuple[str, float, float]] | None = REGION,
+    sort: str = "spectral_abscissa",
+    progress: Progress | None = None,
+) -> Comparison:
+    """Compare feedback structures, and given gains, at an operating point.
+
+    Parameters
+    ----------
+    point : OperatingPoint or RigPoint
+        Where the rig drills.
+    structures : sequence of str or FeedbackStructure
+        Structures to design gains for.
+    given : sequence of (label, structure, K1, K2)
+        Gains from elsewhere.
+    bounds : mapping, optional
+        As in `design`, for the structures that have such gains.
+    disturbance : mapping, optional
+        Perturbation of steady drilling at t = 0 by state name; by default that of the
+        paper's Fig. 13, ``{"dx": 1, "dtheta": 1}``.
+    duration : float
+        Dimensionless time of the simulations.
+    region : pair of (name, low, high), optional
+        Axes of the charts of each candidate's gains; None draws none.
+    sort : str
+        A key of `SORTS`.
+    progress : callable, optional
+        Called with what is being done, steps done and steps in all.
+
+    Returns
+    -------
+    Comparison
+        The open loop is among the rows.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or used twice, or a number is out of range.
+    """
+    began = time.perf_counter()
+    if sort not in SORTS:
+        raise InputError("sort", sort, f"one of {', '.join(SORTS)}")
+    checked_number("duration", duration, 0.0, 1e5, open_low=True)
+    pushed = dict(DISTURBANCE if disturbance is None else disturbance)
+    if not any(pushed.values()):
+        raise InputError("disturbance", pushed, "a perturbation that is not zero")
+    steps = 2 * (len(structures) + len(given)) + 1
+    done = [0]
+
+    def tell(what: str) -> None:
+        if progress is not None:
+            progress(what, done[0], steps)
+        done[0] += 1
+
+    rows: list[Row] = []
+    area = None
+    for label, subject, designed in _subjects(point, structures, given, bounds, tell):
+        tell(f"measures of {label}")
+        chart = _chart(point, subject, region)
+        if label == OPEN_LOOP and chart is not None:
+            area = chart.stable_area
+        rows.append(
+            Row(
+                label,
+                subject,
+                designed,
+                loop_margins(subject),
+                respond(subject, pushed, duration, "linear"),
+                respond(subject, pushed, duration, "nonlinear"),
+                basin(subject, pushed, duration),
+                chart,
+                chart.stable_area / area if chart is not None and area else None,
+            )
+        )
+    if progress is not None:
+        progress("done", steps, steps)
+    rows.sort(key=lambda row: _rank(row, sort))
+    elapsed = time.perf_counter() - began
+    return Comparison(point, tuple(rows), sort, pushed, duration, elapsed)
+
+
+def _chart(
+    point: OperatingPoint | RigPoint,
+    subject: Design,
+    region: tuple[tuple[str, float, float], tuple[str, float, float]] | None,
+) -> StabilityChart | None:
+    if region is None:
+        return None
+    from drillctrl.charts.chart import chart
+
+    if subject.structure is None:
+        return chart(point, *region)
+    return chart(point, *region, subject.structure, subject.K1, subject.K2)
+
+
+def _rank(row: Row, sort: str) -> float:
+    value: Any = row.to_dict()[sort]
+    if isinstance(value, dict):
+        from drillctrl.studies.comparison_text import delay_room
+
+        value = delay_room(value)
+    if value is None:
+        return math.inf
+    return float(-value if SORTS[sort] else value)

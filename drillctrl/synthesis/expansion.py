@@ -1,0 +1,91 @@
+"""det Δ of a loop with one input: a quasi-polynomial, affine in the entries of the gains."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.quasipolynomial import from_matrices
+
+# Differences of coefficients below this, relative, are rounding.
+_NOISE = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """det Δ = Σ_c h_c Σ C[c, k, j] s^j exp(−kτs) with h_0 = 1.
+
+    Attributes
+    ----------
+    coefficients : array, (1 + c, r + 1, n + 1)
+        C of the loop without feedback, then of each entry of the gain matrices.
+    delay : float
+        τ.
+    """
+
+    coefficients: FloatArray
+    delay: float
+
+    def taylor(self, s: ComplexArray, terms: int) -> ComplexArray:
+        """Return the Taylor coefficients about many places, (q,) → (q, 1 + c, terms)."""
+        entries, powers, degrees = self.coefficients.shape
+        binomials, exponents = _binomials(terms, degrees)
+        ladder = s[:, None] ** np.arange(degrees)
+        shift = (binomials * ladder[:, exponents]).transpose(0, 2, 1)
+        # Polynomials in h = s' − s, then times exp(−kτ(s + h)): a product of two series.
+        shifted = self.coefficients.reshape(-1, degrees) @ shift
+        decay = np.exp(-self.delay * s)[:, None] ** np.arange(powers)
+        series = _exponential(terms, powers, self.delay) * decay[:, :, None, None]
+        flat = powers * terms
+        return np.asarray(shifted.reshape(-1, entries, flat) @ series.reshape(-1, flat, terms))
+
+
+def expand(
+    plain: DelaySystem, drive: FloatArray, seen: FloatArray, late: npt.NDArray[np.bool_]
+) -> Expansion:
+    """Expand det Δ of a loop with at most one delay around rank-one terms h_c b c(s)ᵀ.
+
+    Parameters
+    ----------
+    plain : DelaySystem
+        The loop without them.
+    drive, seen : array, (n, c) and (c, n)
+        Columns b, all of one direction, and rows c.
+    late : bool array, (c,)
+        Which rows are seen through exp(−sτ).
+    """
+    terms = np.einsum("nc,cm->cnm", drive, seen)
+    zero = np.zeros_like(plain.A0)
+    now = [zero, *(zero if is_late else term for term, is_late in zip(terms, late, strict=True))]
+    past = [zero, *(term if is_late else zero for term, is_late in zip(terms, late, strict=True))]
+    delayed = plain.delayed[0] if plain.delays else zero
+    delays = np.full(len(now), plain.max_delay)
+    table = from_matrices(plain.A0 + np.array(now), delayed + np.array(past), delays).coefficients
+    table[1:] -= table[0]
+    table[1:][np.abs(table[1:]) < _NOISE * np.abs(table[0]).max()] = 0.0
+    return Expansion(np.ascontiguousarray(table.transpose(0, 2, 1)), plain.max_delay)
+
+
+@functools.lru_cache(maxsize=32)
+def _binomials(terms: int, degrees: int) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """Return binom(j, l), 0 where j < l, and the exponents j − l, each (terms, degrees)."""
+    table = [[float(math.comb(j, i)) for j in range(degrees)] for i in range(terms)]
+    exponents = np.arange(degrees) - np.arange(terms)[:, None]
+    return np.array(table), np.maximum(exponents, 0)
+
+
+@functools.lru_cache(maxsize=32)
+def _exponential(terms: int, powers: int, delay: float) -> FloatArray:
+    """Return (−kτ)^(m − l)/(m − l)!, 0 where m < l, shape (powers, terms, terms)."""
+    table = np.zeros((powers, terms, terms))
+    for k in range(powers):
+        for i in range(terms):
+            for m in range(i, terms):
+                table[k, i, m] = (-k * delay) ** (m - i) / math.factorial(m - i)
+    return table

@@ -1,0 +1,311 @@
+"""The closed loop as a family over its gain vector, made to be evaluated often."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from scipy.linalg.lapack import dgeev
+
+from drillctrl.base.errors import InputError
+from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
+from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum import characteristic
+from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+from drillctrl.synthesis.expansion import Expansion, expand
+
+BoolArray = npt.NDArray[np.bool_]
+
+_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+
+
+@dataclass(frozen=True)
+class ActiveRoot:
+    """A root that is taken to be rightmost.
+
+    Attributes
+    ----------
+    omega : float
+        Its imaginary part; 0 for a real root.
+    multiplicity : int
+        How often it is counted; a complex one implies its conjugate.
+    """
+
+    omega: float
+    multiplicity: int
+
+    @property
+    def equations(self) -> int:
+        """Number of real conditions."""
+        return self.multiplicity * (1 if self.omega == 0.0 else 2)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopFamily:
+    """All loops that one structure closes around one plant.
+
+    The collocated generator is affine in the gains, M(g) = M0 + Σ hj bj cjᵀ with h = S g:
+    an entry hj of (K1, K2) acts from one output, now or delayed, on one input.
+
+    Attributes
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        The structure.
+    base : array, (q, q)
+        M0, the generator with the fixed gains and the free ones at zero.
+    actuation : array, (q, c)
+        Columns bj.
+    measurement : array, (c, q)
+        Rows cjᵀ.
+    spread : array, (c, k)
+        S: how the entries of the gain matrices follow the gain vector.
+    plain : DelaySystem
+        The loop with the fixed gains only.
+    drive, seen : array, (n, c) and (c, n)
+        The same columns and rows in the states of the plant.
+    late : bool array, (c,)
+        Which entries act on a delayed output.
+    degree : int
+        Of the collocation.
+    """
+
+    system: DelaySystem
+    feedback: FeedbackStructure
+    base: FloatArray
+    actuation: FloatArray
+    measurement: FloatArray
+    spread: FloatArray
+    plain: DelaySystem
+    drive: FloatArray
+    seen: FloatArray
+    late: BoolArray
+    degree: int
+
+    def loop(self, gains: FloatArray) -> DelaySystem:
+        """Return the closed loop at a gain vector."""
+        return close_loop(self.system, self.feedback, *self.feedback.gains(gains))
+
+    def matrix(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated generator at a gain vector, shape (q, q)."""
+        return self.base + (self.actuation * (self.spread @ gains)) @ self.measurement
+
+    def abscissa(self, gains: FloatArray) -> tuple[float, FloatArray]:
+        """Return the collocated spectral abscissa and its gradient.
+
+        Parameters
+        ----------
+        gains : array, (k,)
+            The gain vector.
+
+        Returns
+        -------
+        value : float
+            Largest real part of an eigenvalue of M(g).
+        gradient : array, (k,)
+            Σ Sij Re (yᴴ bi)(ciᵀ x) / (yᴴ x) for the rightmost eigenvalue; one of the
+            gradients there are where several eigenvalues are rightmost.
+        """
+        real, imag, left, right, info = dgeev(self.matrix(gains), 1, 1)
+        if info:
+            return np.inf, np.zeros_like(gains)
+        top = int(np.argmax(real))
+        y, x = left[:, top], right[:, top]
+        if imag[top] != 0.0:
+            # LAPACK stores a conjugate pair as real and imaginary columns.
+            first = top if imag[top] > 0 else top - 1
+            y = left[:, first] + 1j * left[:, first + 1]
+            x = right[:, first] + 1j * right[:, first + 1]
+        y = y.conj()
+        scale = y @ x
+        slopes = ((y @ self.actuation) * (self.measurement @ x)) @ self.spread
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            gradient = np.real(slopes / scale)
+        return float(real[top]), np.where(np.isfinite(gradient), gradient, 0.0)
+
+    def abscissas(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated spectral abscissa at many gain vectors, (q, k) → (q,)."""
+        if len(gains) == 0:
+            return np.zeros(0)
+        return np.asarray(np.linalg.eigvals(self.matrices(gains)).real.max(axis=1))
+
+    def matrices(self, gains: FloatArray) -> FloatArray:
+        """Return the collocated generator at many gain vectors, (r, k) → (r, q, q)."""
+        entries = gains @ self.spread.T
+        return np.asarray(self.base + (self.actuation * entries[:, None, :]) @ self.measurement)
+
+    def active_gradients(
+        self, gains: FloatArray, width: float = 1e-6
+    ) -> tuple[FloatArray, tuple[ActiveRoot, ...]]:
+        """Return the gradients of all roots within ``width`` of the abscissa, (q, k)."""
+        values, left, right = scipy.linalg.eig(self.matrix(gains), left=True, right=True)
+        top = values.real.max()
+        active = np.flatnonzero((values.real > top - width * (1 + abs(top))) & (values.imag >= 0))
+        y, x = left[:, active].conj().T, right[:, active]
+        scale = np.einsum("qn,nq->q", y, x)
+        slopes = ((y @ self.actuation) * (self.measurement @ x).T) @ self.spread
+        roots = tuple(ActiveRoot(float(s.imag), 1) for s in values[active])
+        return np.real(slopes / scale[:, None]), roots
+
+    def determinant(self, s: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return det Δ(s) of the loop and its derivatives by the gains.
+
+        Parameters
+        ----------
+        s : array, (q,)
+            Points that are no roots.
+        gains : array, (k,)
+            The gain vector.
+
+        Returns
+        -------
+        array, (q,), and array, (q, k)
+            ∂ det Δ/∂hj = −det Δ · cj(s)ᵀ Δ⁻¹ bj, exact.
+        """
+        seen = self.seen_at(s)
+        delta = self.characteristic_matrix(s, gains)
+        value = np.linalg.det(delta)
+        response = np.linalg.inv(delta) @ self.drive
+        slopes = -value[:, None] * np.einsum("qkn,qnk->qk", seen, response)
+        return value, slopes @ self.spread
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether det Δ is affine in all gains together: they drive one and the same input."""
+        return bool(np.linalg.matrix_rank(self.drive) == 1) if self.drive.size else False
+
+    @functools.cached_property
+    def expansion(self) -> Expansion | None:
+        """The determinant as a quasi-polynomial; None with several inputs or delays."""
+        if not self.is_affine or len(self.plain.delays) > 1:
+            return None
+        return expand(self.plain, self.drive, self.seen, self.late)
+
+    def taylor(
+        self, s: ComplexArray, gains: FloatArray, terms: int
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Expand det Δ(s) of the loop about many places.
+
+        Parameters
+        ----------
+        s : array, (q,)
+            Places; they may be roots.
+        gains : array, (k,)
+            The gain vector.
+        terms : int
+            Number of coefficients.
+
+        Returns
+        -------
+        array, (q, terms), and array, (q, terms, k)
+            Taylor coefficients and their derivatives by the gains.
+        """
+        if self.expansion is not None:
+            each = self.expansion.taylor(s, terms)
+            slopes = each[:, 1:].transpose(0, 2, 1) @ self.spread
+            return each[:, 0] + slopes @ gains, slopes
+        # Samples on a circle: aliasing falls with the power points − terms.
+        radius = 0.1 * (1.0 + np.abs(s))
+        ring = s[:, None] + radius[:, None] * _CIRCLE
+        value, slope = self.determinant(ring.ravel(), gains)
+        wave = _CIRCLE[:, None] ** -np.arange(terms) / _CIRCLE.size
+        scale = radius[:, None] ** -np.arange(terms)
+        slopes = np.einsum("qpk,pl->qlk", slope.reshape(*ring.shape, gains.size), wave)
+        return value.reshape(ring.shape) @ wave * scale, slopes * scale[..., None]
+
+    def seen_at(self, s: ComplexArray) -> ComplexArray:
+        """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
+        lag = np.exp(-s * self.plain.max_delay)
+        return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
+
+    def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
+        """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
+        drive = self.drive * (self.spread @ gains)
+        fed_back = np.einsum("nk,qkm->qnm", drive, self.seen_at(s))
+        return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
+
+    def eigenvalues(self, gains: FloatArray) -> ComplexArray:
+        """Return the eigenvalues of the collocated generator, rightmost first."""
+        values = np.linalg.eigvals(self.matrix(gains)).astype(complex)
+        return values[np.argsort(-values.real, kind="stable")]
+
+
+def loop_family(
+    system: DelaySystem, feedback: FeedbackStructure, degree: int | None = None
+) -> LoopFamily:
+    """Assemble the family of closed loops.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant, with at least one delay where the structure uses delayed outputs.
+    feedback : FeedbackStructure
+        Names inputs, outputs, bounds and ties.
+    degree : int, optional
+        Of the collocation; by default what the largest gains within the bounds need.
+    """
+    drive, measure = loop_channels(system, feedback)
+    half, shape = feedback.K1_lower.size, feedback.K1_lower.shape
+    spread = feedback.spread
+    entries = np.flatnonzero(spread.any(axis=1))
+    late = entries >= half
+    target, source = (entries % half) // shape[1], (entries % half) % shape[1]
+    fixed = feedback.fixed
+    plain = close_loop(system, feedback, fixed[:half].reshape(shape), fixed[half:].reshape(shape))
+    # Carry what the plant delays anyway and the measured outputs that are fed back late.
+    if late.any() and not system.delays:
+        raise InputError("structure", feedback.name, "without delayed outputs: no delay is known")
+    nothing = np.zeros((system.order, 0)), np.zeros((0, system.order))
+    left, right = plain.factors[-1] if plain.factors else nothing
+    for output in sorted(set(source[late].tolist())):
+        wider = np.vstack([right, measure[output]])
+        if np.linalg.matrix_rank(wider) > right.shape[0]:
+            right = wider
+    left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
+    factors = (*plain.factors[:-1], (left, right)) if plain.factors else ()
+    if degree is None:
+        # Three more than suffices to start an iteration on the characteristic equation.
+        degree = degree_for(_largest(system, feedback), 0.0) + 3
+    base = generator_matrix(plain, degree, factors)
+    size, n, rank = base.shape[0], system.order, right.shape[0]
+    actuation = np.zeros((size, entries.size))
+    actuation[:n] = drive[:, target]
+    measurement = np.zeros((entries.size, size))
+    for row, output in enumerate(source):
+        if late[row]:
+            weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
+            measurement[row, size - rank :] = weights
+        else:
+            measurement[row, :n] = measure[output]
+    return LoopFamily(
+        system,
+        feedback,
+        base,
+        actuation,
+        measurement,
+        spread[entries],
+        plain,
+        actuation[:n],
+        measure[source],
+        late,
+        degree,
+    )
+
+
+def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:
+    """Return a loop whose matrices bound those of every loop in the family."""
+    drive, measure = loop_channels(system, feedback)
+    now = np.maximum(np.abs(feedback.K1_lower), np.abs(feedback.K1_upper))
+    past = np.maximum(np.abs(feedback.K2_lower), np.abs(feedback.K2_upper))
+    lag = system.max_delay
+    delayed = tuple(
+        np.abs(a) + (np.abs(drive) @ past @ np.abs(measure) if tau == lag else 0.0)
+        for tau, a in zip(system.delays, system.delayed, strict=True)
+    )
+    magnitude = np.abs(system.A0) + np.abs(drive) @ now @ np.abs(measure)
+    return DelaySystem(magnitude, delayed, system.delays, system.B, system.C)

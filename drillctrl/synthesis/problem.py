@@ -1,0 +1,153 @@
+"""From what is wanted of a design to gains: choose the method and run it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drillctrl.robustness.radius import pseudospectral_abscissa
+from drillctrl.robustness.transfer import frequency_grid, loop_transfer
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.semidiscretization import semidiscretize
+from drillctrl.synthesis import descent, measures
+from drillctrl.synthesis.certificate import OptimalityCertificate, certify_optimality
+from drillctrl.synthesis.constrained import certify_sampled, constrained_search
+from drillctrl.synthesis.family import LoopFamily
+from drillctrl.synthesis.objectives import (
+    Exact,
+    Objective,
+    Requirements,
+    Robust,
+    SemiDiscrete,
+    WorstCase,
+)
+from drillctrl.synthesis.rounding import hold_multiple_root
+from drillctrl.synthesis.search import global_search
+
+# A requirement is met with this relative margin, so that rounding does not break it.
+_MARGIN = 1e-6
+_CANDIDATES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Gains that solve a design problem.
+
+    Attributes
+    ----------
+    gains : array, (k,)
+        Within the bounds.
+    optimality : OptimalityCertificate
+        What is known of their optimality.
+    evaluations : int
+        Of all objectives.
+    """
+
+    gains: FloatArray
+    optimality: OptimalityCertificate
+    evaluations: int
+
+
+def solve(
+    family: LoopFamily,
+    objective: Objective,
+    requirements: Requirements,
+    others: Sequence[LoopFamily] = (),
+    seed: int = 0,
+) -> Solution:
+    """Find the gains of a design.
+
+    Parameters
+    ----------
+    family : LoopFamily
+        Nominal loops.
+    objective : Objective
+        What is minimised.
+    requirements : Requirements
+        What must hold as well.
+    others : sequence of LoopFamily
+        Loops at the other points of a `WorstCase`.
+    seed : int
+        Of the starting points.
+    """
+    search = global_search(family, seed)
+    plain = isinstance(objective, Exact)
+    # What the unconstrained optimum meets is no constraint.
+    if plain and meets(family, search.best.gains, requirements):
+        gains = hold_multiple_root(family, search.best)
+        return Solution(gains, certify_optimality(family, gains, search), search.evaluations)
+    goal, excesses = _goal(family, objective, others), _excesses(family, requirements)
+    candidates = [basin.gains for basin in search.basins[:_CANDIDATES]]
+    found = constrained_search(family, goal, excesses, candidates, seed)
+    certificate = certify_sampled(family, goal, excesses, found, seed)
+    return Solution(found.gains, certificate, search.evaluations + found.evaluations)
+
+
+def meets(family: LoopFamily, gains: FloatArray, requirements: Requirements) -> bool:
+    """Whether gains meet all requirements, by the quick measures."""
+    return all(excess(gains)[0] <= _MARGIN for excess in _excesses(family, requirements))
+
+
+def reported_value(family: LoopFamily, objective: Objective, gains: FloatArray) -> float | None:
+    """Return an objective computed with care; None where it is an exact abscissa."""
+    loop = family.loop(gains)
+    if isinstance(objective, SemiDiscrete):
+        return semidiscretize(loop, objective.m, objective.order).growth_rate
+    if isinstance(objective, Robust):
+        weights = measures.plant_weights(family).tolist()
+        return pseudospectral_abscissa(loop, objective.epsilon, weights)
+    return None
+
+
+def input_gain(family: LoopFamily, gains: FloatArray) -> float:
+    """Return the peak gain from a disturbance beside the input to the fed-back input."""
+    K1, K2 = family.feedback.gains(gains)
+    omega = frequency_grid(family.loop(gains))
+    loop = np.moveaxis(-loop_transfer(family.system, family.feedback, K1, K2, omega), -1, 0)
+    transfer = np.linalg.solve(np.eye(loop.shape[-1]) - loop, loop)
+    sampled = float(np.linalg.norm(transfer, 2, axis=(1, 2)).max())
+    inverse = measures.inverse_input_gain(family)(gains)[0]
+    return max(sampled, 1.0 / inverse if inverse > 0.0 else np.inf)
+
+
+def _goal(
+    family: LoopFamily, objective: Objective, others: Sequence[LoopFamily]
+) -> descent.Objective:
+    if isinstance(objective, SemiDiscrete):
+        return measures.growth_rate(family, objective.m, objective.order)
+    if isinstance(objective, WorstCase):
+        return measures.worst_case([family, *others])
+    if isinstance(objective, Robust):
+        return measures.pseudospectral(family, objective.epsilon)
+    return family.abscissa
+
+
+def _at_least(measure: descent.Objective, wanted: float) -> descent.Objective:
+    def excess(gains: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = measure(gains)
+        return 1.0 + _MARGIN - value / wanted, -gradient / wanted
+
+    return excess
+
+
+def _excesses(family: LoopFamily, requirements: Requirements) -> list[descent.Objective]:
+    """Return what must not be positive: each shortfall relative to what is required."""
+    pairs: list[tuple[float | None, Callable[[LoopFamily], descent.Objective]]] = [
+        (requirements.decay, _decay),
+        (requirements.stability_radius, measures.distance),
+        (
+            None if requirements.input_gain is None else 1.0 / requirements.input_gain,
+            measures.inverse_input_gain,
+        ),
+    ]
+    return [_at_least(measure(family), wanted) for wanted, measure in pairs if wanted is not None]
+
+
+def _decay(family: LoopFamily) -> descent.Objective:
+    def rate(gains: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = family.abscissa(gains)
+        return -value, -np.asarray(gradient)
+
+    return rate

@@ -1,0 +1,270 @@
+"""Deterministic global search: descents from many starts, sharpened on their active roots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
+from drillctrl.synthesis.descent import bfgs
+from drillctrl.synthesis.explicit import explicit_candidates
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily
+
+# Relative distances up to which eigenvalues may be meant to coincide.
+_WIDTHS = (0.05, 0.2, 0.5)
+# How often a descent may be taken up again where sharpening led away from its end.
+_DESCENTS = 4
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to search.
+
+    Attributes
+    ----------
+    looked : int
+        Points of the box at which the abscissa is evaluated.
+    begun : int
+        Descents begun at the best of them; with 0, none are looked at.
+    steps : int
+        Evaluations of each descent.
+    sharpened : int
+        Distinct ends that are sharpened on their active roots.
+    rounds : int
+        How often the configuration of active roots of an end is looked at again.
+    """
+
+    looked: int
+    begun: int
+    steps: int
+    sharpened: int
+    rounds: int
+
+
+EFFORTS = {
+    1: Effort(16, 2, 25, 1, 1),
+    2: Effort(32, 5, 35, 2, 3),
+    3: Effort(128, 10, 80, 5, 4),
+    4: Effort(256, 18, 80, 6, 4),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """Where one descent ended.
+
+    Attributes
+    ----------
+    gains : array, (k,)
+        The gain vector.
+    value : float
+        Collocated spectral abscissa there.
+    roots : tuple of ActiveRoot
+        Active roots that it was sharpened on; empty if it was not.
+    """
+
+    gains: FloatArray
+    value: float
+    roots: tuple[ActiveRoot, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Result of a global search.
+
+    Attributes
+    ----------
+    best : Basin
+        The lowest end.
+    basins : tuple of Basin
+        Distinct ends, lowest first.
+    hits : int
+        How many descents ended in the lowest basin.
+    evaluations : int
+        Eigenvalue problems and root conditions solved.
+    """
+
+    best: Basin
+    basins: tuple[Basin, ...]
+    hits: int
+    evaluations: int
+
+
+def global_search(
+    family: LoopFamily,
+    seed: int = 0,
+    effort: Effort | None = None,
+    known: Sequence[FloatArray] = (),
+) -> Search:
+    """Minimise the collocated abscissa over the box of the family's structure.
+
+    Parameters
+    ----------
+    family : LoopFamily
+        Loops to choose from.
+    seed : int
+        Scrambles the Halton points; the same seed gives the same result.
+    effort : Effort, optional
+        By default according to the number of gains.
+    known : sequence of array, (k,)
+        Gains that are good nearby; descents begin there too.
+    """
+    lower, upper = family.feedback.lower, family.feedback.upper
+    count = lower.size
+    if count == 0:
+        value, _ = family.abscissa(lower)
+        only = Basin(lower, value, ())
+        return Search(only, (only,), 1, 1)
+    effort = EFFORTS[min(count, 4)] if effort is None else effort
+    starts = [np.clip(gains, lower, upper) for gains in known]
+    evaluations = 0
+    if effort.begun:
+        starts += list(starting_points(family, seed, effort))
+        evaluations += 2 * effort.looked
+    ends = []
+    for start in starts:
+        end = bfgs(family.abscissa, start, lower, upper, most=effort.steps)
+        evaluations += end.evaluations
+        ends.append(Basin(end.gains, end.value, ()))
+    ends.sort(key=lambda basin: basin.value)
+    sharp: list[Basin] = []
+    rest: list[Basin] = []
+    width = upper - lower
+    for i, basin in enumerate(ends):
+        # Another descent into the same corner teaches nothing.
+        seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
+        if len(sharp) == effort.sharpened or seen:
+            # Exact: near a multiple root the collocation promises more than there is.
+            exact = spectral_abscissa(family.loop(basin.gains))
+            rest.append(Basin(basin.gains, exact, ()))
+            evaluations += 1
+            continue
+        better, used = _settle(family, basin, effort)
+        evaluations += used
+        sharp.append(better)
+    everything = sorted([*sharp, *rest], key=lambda basin: basin.value)
+    distinct = _distinct(everything)
+    best = distinct[0]
+    tolerance = 1e-6 * (1.0 + abs(best.value))
+    hits = sum(basin.value <= best.value + tolerance for basin in everything)
+    return Search(best, distinct, hits, evaluations)
+
+
+def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
+    """Return the best points of two Halton sets, over the box and over its middle part."""
+    lower, upper = family.feedback.lower, family.feedback.upper
+    cube = qmc.Halton(lower.size, scramble=True, rng=seed).random(effort.looked)
+    wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
+    # The box is generous: many useful gains are small against it.
+    points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
+    inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
+    values = family.abscissas(points)
+    order = np.argsort(values, kind="stable")
+    deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
+    placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
+    chosen = np.vstack([placed, points[order[: max(0, effort.begun - len(placed))]]])
+    return np.asarray(np.clip(chosen, inside[0], inside[1]))
+
+
+def _settle(family: LoopFamily, basin: Basin, effort: Effort) -> tuple[Basin, int]:
+    """Sharpen an end; where that leads away from it, descend again from there."""
+    lower, upper = family.feedback.lower, family.feedback.upper
+    best, used = improve(family, basin, effort.rounds)
+    before = basin.value
+    for _ in range(_DESCENTS):
+        if best.roots or best.value > before - 1e-4 * (1.0 + abs(before)):
+            break
+        before = best.value
+        end = bfgs(family.abscissa, best.gains, lower, upper, most=effort.steps)
+        again, more = improve(family, Basin(end.gains, end.value, ()), effort.rounds)
+        used += end.evaluations + more
+        best = min(best, again, key=lambda basin: basin.value)
+    return best, used
+
+
+def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
+    """Sharpen an end on every configuration of active roots that its spectrum suggests.
+
+    Each success is looked at again: roots that have become active join the configuration.
+
+    Returns
+    -------
+    Basin
+        The best found; the given one if nothing is better.
+    int
+        Evaluations used.
+    """
+    # From here on abscissas are exact: the collocation's error is as large as what is gained.
+    used = 1
+    best = Basin(basin.gains, spectral_abscissa(family.loop(basin.gains)), ())
+    tried: set[tuple[tuple[bool, int], ...]] = set()
+    for _ in range(rounds):
+        values = family.eigenvalues(best.gains)
+        used += 1
+        improved = False
+        for width in _WIDTHS:
+            for roots in hypotheses(values, best.gains.size, width * (1.0 + abs(best.value))):
+                key = tuple((root.omega == 0.0, root.multiplicity) for root in roots)
+                if key in tried:
+                    continue
+                tried.add(key)
+                sharp = sharpen(family, best.gains, best.value, roots)
+                value = spectral_abscissa(family.loop(sharp.gains))
+                used += sharp.evaluations + 1
+                converged = sharp.residual < 1e-9 and value < sharp.abscissa + _blur(roots)
+                if converged and sharp.abscissa < best.value - 1e-12:
+                    best = Basin(sharp.gains, sharp.abscissa, sharp.roots)
+                    improved = True
+                elif value < best.value - 1e-9:
+                    best = Basin(sharp.gains, value, ())
+                    improved = True
+        if not improved:
+            break
+    return best, used
+
+
+def follow(family: LoopFamily, start: FloatArray, roots: tuple[ActiveRoot, ...]) -> Basin | None:
+    """Return the optimum near some gains with given active roots, if there is one.
+
+    Parameters
+    ----------
+    family : LoopFamily
+        Loops to choose from.
+    start : array, (k,)
+        Gains that are nearly optimal, such as those of a loop nearby.
+    roots : tuple of ActiveRoot
+        The roots that were active there.
+    """
+    lower, upper = family.feedback.lower, family.feedback.upper
+    start = np.clip(start, lower, upper)
+    sharp = sharpen(family, start, spectral_abscissa(family.loop(start)), roots)
+    if not _holds(family, sharp):
+        return None
+    return Basin(sharp.gains, sharp.abscissa, sharp.roots)
+
+
+def _holds(family: LoopFamily, sharp: ActiveDesign) -> bool:
+    """Whether the conditions are met and no other root lies further right."""
+    if not sharp.residual < 1e-9:
+        return False
+    value = spectral_abscissa(family.loop(sharp.gains))
+    return value < sharp.abscissa + _blur(sharp.roots)
+
+
+def _blur(roots: tuple[ActiveRoot, ...]) -> float:
+    """What the abscissa shows of conditions that hold to rounding: its k-th root."""
+    return float(1e-9 ** (1.0 / max(root.multiplicity for root in roots)))
+
+
+def _distinct(basins: list[Basin]) -> tuple[Basin, ...]:
+    kept: list[Basin] = []
+    for basin in basins:
+        tolerance = 1e-4 * (1.0 + abs(basin.value))
+        if all(abs(basin.value - other.value) > tolerance for other in kept):
+            kept.append(basin)
+    return tuple(kept)

@@ -1,0 +1,74 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drillctrl.base import units
+from drillctrl.base.errors import InputError
+
+EXPECTED = [
+    ("120 rpm", units.ROTARY_SPEED, 4 * math.pi),
+    ("120 RPM", units.ROTARY_SPEED, 4 * math.pi),
+    ("2 rev/s", units.ROTARY_SPEED, 4 * math.pi),
+    ("3.6 m/h", units.SPEED, 1e-3),
+    ("3.6 m/hr", units.SPEED, 1e-3),
+    ("100 ft/h", units.SPEED, 30.48 / 3600),
+    ("20 kN", units.FORCE, 2e4),
+    ("1 klbf", units.FORCE, 4448.2216152605),
+    ("5 kN*m", units.TORQUE, 5e3),
+    ("5 kNm", units.TORQUE, 5e3),
+    ("5 kN·m", units.TORQUE, 5e3),
+    ("1000 ft*lbf", units.TORQUE, 1355.8179483314),
+    ("1000 ft-lbf", units.TORQUE, 1355.8179483314),
+    ("1 kft·lbf", units.TORQUE, 1355.8179483314),
+    ("4.25 in", units.LENGTH, 0.10795),
+    ("60 MPa", units.STRESS, 6e7),
+    ("1000 psi", units.STRESS, 6894757.293168),
+    ("938 N*m/rad", units.TORSIONAL_STIFFNESS, 938.0),
+    ("116 kg*m^2", units.INERTIA, 116.0),
+    ("0.6", units.NUMBER, 0.6),
+]
+
+
+@pytest.mark.parametrize(("text", "dimension", "value"), EXPECTED)
+def test_units_of_the_field_are_understood(text, dimension, value):
+    assert units.to_si("x", text, dimension) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension"),
+    [
+        ("12 kg", units.ROTARY_SPEED),
+        ("2 Hz", units.ROTARY_SPEED),
+        ("120", units.ROTARY_SPEED),
+        ("20 klbs", units.FORCE),
+        ("20 klb", units.FORCE),
+        ("30 bbl", units.LENGTH),
+        ("", units.SPEED),
+        ("fast", units.SPEED),
+        ("nan rpm", units.ROTARY_SPEED),
+        ("1e400 m/h", units.SPEED),
+        ("9**9**9**9 m/s", units.SPEED),
+        ("2 m**9**9**9", units.LENGTH),
+        ("__import__('os')", units.SPEED),
+        ("1 m" + "/s" * 100, units.SPEED),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(text, dimension):
+    with pytest.raises(InputError, match="^x = "):
+        units.to_si("x", text, dimension)
+
+
+@given(st.floats(1e-6, 1e6))
+def test_display_units_come_back(value):
+    shown = units.from_si(value, units.ROTARY_SPEED, "rpm")
+    assert units.to_si("x", f"{shown!r} rpm", units.ROTARY_SPEED) == pytest.approx(value)
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_either_a_number_or_an_input_error(text):
+    try:
+        assert math.isfinite(units.to_si("x", text, units.LENGTH))
+    except InputError as error:
+        assert "\n" not in str(error)
