@@ -16,35 +16,45 @@ if TYPE_CHECKING:
     from drillctrl.charts.discretised import GainSurface, RootLocus, gain_surface, root_locus
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.volume import StabilityVolume, stability_volume
-    from drillctrl.delay.structure import FeedbackStructure, Tie, close_loop, preset_structure
-    from drillctrl.delay.system import DelaySystem, plant_system
+    from drillctrl.delay.closing import close_loop
+    from drillctrl.delay.structure import FeedbackStructure, Tie
+    from drillctrl.delay.system import DelaySystem
     from drillctrl.designs.design import analyze, design
     from drillctrl.designs.loop_analysis import LoopAnalysis, analyze_loop
+    from drillctrl.designs.loops import spectral_abscissas
+    from drillctrl.designs.margins import point_margins
     from drillctrl.designs.result import Design
-    from drillctrl.drilling.drive import soft_torque, top_drive_plant
+    from drillctrl.designs.sensitivity import root_sensitivity
+    from drillctrl.designs.worst_case import WorstCase
+    from drillctrl.drilling.drive import top_drive_plant
+    from drillctrl.drilling.linear import plant_system
     from drillctrl.drilling.plant import Plant, dimensional_plant, dimensionless_plant
     from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.drilling.rig import Rig, load_rig, save_rig, table1
     from drillctrl.drilling.sensors import with_actuator_lag, with_filter
     from drillctrl.drilling.steady import SteadyState, rig_point_at_weight_on_bit, steady_state
-    from drillctrl.drilling.structures import feed
+    from drillctrl.drilling.structures import feed, preset_structure, soft_torque
     from drillctrl.interop.controllers import controller_system, scheduled_controller
     from drillctrl.interop.lifted import lifted_system, pade_approximation
     from drillctrl.interop.plants import from_control
+    from drillctrl.interop.responses import loop_frd, to_frd
     from drillctrl.paper.agreement import Agreement
     from drillctrl.paper.reproduce import reproduce
-    from drillctrl.robustness.margins import delay_margin, parameter_margin, point_margins
+    from drillctrl.robustness.margins import delay_margin, parameter_margin
     from drillctrl.robustness.radius import (
         pseudospectral_abscissa,
         real_stability_radius,
         stability_radius,
     )
-    from drillctrl.robustness.transfer import frequency_response, loop_frd, loop_transfer, to_frd
-    from drillctrl.simulation import Change, Controller, Past, Scenario, Simulation, simulate
+    from drillctrl.robustness.transfer import frequency_response, loop_transfer
+    from drillctrl.simulation.controller import Controller
     from drillctrl.simulation.energy import band_energy
     from drillctrl.simulation.floquet import floquet
     from drillctrl.simulation.orbits import limit_cycle, separation
-    from drillctrl.spectrum.batch import spectral_abscissas
+    from drillctrl.simulation.past import Past
+    from drillctrl.simulation.result import Simulation
+    from drillctrl.simulation.run import simulate
+    from drillctrl.simulation.scenario import Change, Scenario
     from drillctrl.spectrum.count import count_right_of
     from drillctrl.spectrum.proof import prove_count
     from drillctrl.spectrum.roots import (
@@ -54,17 +64,11 @@ if TYPE_CHECKING:
         spectral_abscissa,
     )
     from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
-    from drillctrl.spectrum.sensitivity import root_sensitivity
     from drillctrl.spectrum.trust import compare_spectra, intervals_for
     from drillctrl.studies.campaign import Campaign, campaign
-    from drillctrl.studies.compare import Comparison, compare
-    from drillctrl.synthesis.objectives import (
-        Exact,
-        Requirements,
-        Robust,
-        SemiDiscrete,
-        WorstCase,
-    )
+    from drillctrl.studies.compare import compare
+    from drillctrl.studies.comparison import Comparison
+    from drillctrl.synthesis.objectives import Exact, Requirements, Robust, SemiDiscrete
     from drillctrl.tables.files import load_table, save_table
     from drillctrl.tables.grid import Axis, Grid, dimensionless_grid, linear_axis, rig_grid
     from drillctrl.tables.table import GainTable, table
@@ -73,10 +77,10 @@ _HOME = {
     "Agreement": "paper.agreement",
     "Axis": "tables.grid",
     "Campaign": "studies.campaign",
-    "Change": "simulation",
+    "Change": "simulation.scenario",
     "Checkpoint": "base.checkpoint",
-    "Comparison": "studies.compare",
-    "Controller": "simulation",
+    "Comparison": "studies.comparison",
+    "Controller": "simulation.controller",
     "DelaySystem": "delay.system",
     "Design": "designs.result",
     "Exact": "synthesis.objectives",
@@ -87,7 +91,7 @@ _HOME = {
     "InputError": "base.errors",
     "LoopAnalysis": "designs.loop_analysis",
     "OperatingPoint": "drilling.point",
-    "Past": "simulation",
+    "Past": "simulation.past",
     "Plant": "drilling.plant",
     "Requirements": "synthesis.objectives",
     "Rig": "drilling.rig",
@@ -95,23 +99,23 @@ _HOME = {
     "Robust": "synthesis.objectives",
     "Root": "spectrum.roots",
     "RootLocus": "charts.discretised",
-    "Scenario": "simulation",
+    "Scenario": "simulation.scenario",
     "SemiDiscrete": "synthesis.objectives",
     "SemiDiscretization": "spectrum.semidiscretization",
-    "Simulation": "simulation",
+    "Simulation": "simulation.result",
     "StabilisableChart": "charts.stabilisable",
     "StabilityChart": "charts.chart",
     "StabilityVolume": "charts.volume",
     "SteadyState": "drilling.steady",
     "Tie": "delay.structure",
-    "WorstCase": "synthesis.objectives",
+    "WorstCase": "designs.worst_case",
     "analyze": "designs.design",
     "analyze_loop": "designs.loop_analysis",
     "band_energy": "simulation.energy",
     "campaign": "studies.campaign",
     "characteristic_roots": "spectrum.roots",
     "chart": "charts.chart",
-    "close_loop": "delay.structure",
+    "close_loop": "delay.closing",
     "compare": "studies.compare",
     "compare_spectra": "spectrum.trust",
     "controller_system": "interop.controllers",
@@ -133,13 +137,13 @@ _HOME = {
     "linear_axis": "tables.grid",
     "load_rig": "drilling.rig",
     "load_table": "tables.files",
-    "loop_frd": "robustness.transfer",
+    "loop_frd": "interop.responses",
     "loop_transfer": "robustness.transfer",
     "pade_approximation": "interop.lifted",
     "parameter_margin": "robustness.margins",
-    "plant_system": "delay.system",
-    "point_margins": "robustness.margins",
-    "preset_structure": "delay.structure",
+    "plant_system": "drilling.linear",
+    "point_margins": "designs.margins",
+    "preset_structure": "drilling.structures",
     "prove_count": "spectrum.proof",
     "pseudospectral_abscissa": "robustness.radius",
     "real_stability_radius": "robustness.radius",
@@ -147,23 +151,23 @@ _HOME = {
     "rig_grid": "tables.grid",
     "rig_point_at_weight_on_bit": "drilling.steady",
     "root_locus": "charts.discretised",
-    "root_sensitivity": "spectrum.sensitivity",
+    "root_sensitivity": "designs.sensitivity",
     "save_rig": "drilling.rig",
     "save_table": "tables.files",
     "scheduled_controller": "interop.controllers",
     "semidiscretize": "spectrum.semidiscretization",
     "separation": "simulation.orbits",
-    "simulate": "simulation",
-    "soft_torque": "drilling.drive",
+    "simulate": "simulation.run",
+    "soft_torque": "drilling.structures",
     "spectral_abscissa": "spectrum.roots",
-    "spectral_abscissas": "spectrum.batch",
+    "spectral_abscissas": "designs.loops",
     "stabilisable_chart": "charts.stabilisable",
     "stability_radius": "robustness.radius",
     "stability_volume": "charts.volume",
     "steady_state": "drilling.steady",
     "table": "tables.table",
     "table1": "drilling.rig",
-    "to_frd": "robustness.transfer",
+    "to_frd": "interop.responses",
     "top_drive_plant": "drilling.drive",
     "with_actuator_lag": "drilling.sensors",
     "with_filter": "drilling.sensors",

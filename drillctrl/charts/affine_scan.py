@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.charts.scan import ScanLine
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 
 _PHASE_STEP = 0.4

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.charts.scan import ScanLine
-from drillctrl.spectrum.characteristic import FloatArray
 
 Interval = tuple[float, float, float, float]
 Node = tuple[int, int, int]  # line, interval, 0 for its start and 1 for its end
@@ -116,7 +119,7 @@ def _walk(start: Node, links: dict[Node, list[Node]], seen: set[Node]) -> tuple[
         seen.add(onward[0])
 
 
-def stable_strips(lines: tuple[ScanLine, ...], *, rows: bool) -> list[FloatArray]:
+def stable_strips(lines: Sequence[ScanLine], *, rows: bool) -> list[FloatArray]:
     """Return polygons that cover the stable set, a quadrilateral per panel and interval.
 
     Returns
@@ -135,3 +138,9 @@ def stable_strips(lines: tuple[ScanLine, ...], *, rows: bool) -> list[FloatArray
             corners = np.array([[t0, one[0]], [t0, one[1]], [t1, two[1]], [t1, two[0]]])
             polygons.append(corners[:, ::-1] if rows else corners)
     return polygons
+
+
+def curve_fields(curve: Curve) -> dict[str, Any]:
+    """Return one boundary curve."""
+    omega = [value if math.isfinite(value) else None for value in curve.omega.tolist()]
+    return {"omega": omega, "closed": curve.closed}

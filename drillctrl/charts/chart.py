@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.base.errors import InputError, checked_number
-from drillctrl.charts.affine_scan import affine_loops, scan_affine
-from drillctrl.charts.axes import Axis, make_axis
-from drillctrl.charts.chains import Curve, stable_curves
-from drillctrl.charts.counting_scan import scan_counting
-from drillctrl.charts.delay_scan import scan_rotary_speed
-from drillctrl.charts.plane import Plane, check_plane
+from drillctrl.base.errors import checked_number
+from drillctrl.charts.chains import Curve, curve_fields, stable_curves
+from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
 from drillctrl.charts.regions import Region, label_regions
-from drillctrl.charts.scan import ScanLine, Scanner
+from drillctrl.charts.scan import ScanLine
+from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.charts.sweep import sweep
-from drillctrl.delay.structure import FeedbackStructure, gain_matrices, preset_structure
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.count import count_right_of
-from drillctrl.spectrum.quasipolynomial import from_matrices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-AxisLike = Axis | Sequence[object]
-_SHORTEST_DELAY_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,21 +76,65 @@ class StabilityChart:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
-        from drillctrl.charts.export import chart_fields
-
-        return chart_fields(self)
+        return {
+            "schema": "drillctrl/chart/1",
+            **plane_fields(self.plane),
+            "optimised": False,
+            "level": self.level,
+            "stable_area": self.stable_area,
+            "stable_area_error": self.area_error,
+            "undecided_area": self.undecided_area,
+            "boundaries": [curve.points.tolist() for curve in self.curves],
+            "boundary_details": [curve_fields(curve) for curve in self.curves],
+            "regions": [dataclasses.asdict(region) for region in self.regions],
+            "method": self.method,
+            "elapsed_seconds": self.elapsed_seconds,
+        }
 
     def summary(self) -> str:
         """Return a text for people."""
-        from drillctrl.charts.export import chart_summary
-
-        return chart_summary(self)
+        plane = self.plane
+        name = plane.structure.name if plane.structure else "open loop"
+        lines = [
+            f"Stability chart of {name}",
+            f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
+            f"{plane.y.label} in [{plane.y.low:g}, {plane.y.high:g}]",
+            f"  stable    {area_text(self.stable_area, self.area_error, plane)}",
+        ]
+        if self.level:
+            lines.append(f"  meaning   all roots left of {self.level:g}")
+        if self.undecided_area > 0.0:
+            lines.append(
+                f"  undecided {self.undecided_area:.4g} at the lowest rotary speeds, "
+                "within the error"
+            )
+        frequencies = [curve.omega for curve in self.curves]
+        if frequencies:
+            omega = np.concatenate(frequencies)
+            lines.append(
+                f"  boundary  {len(self.curves)} curve(s), frequencies {omega.min():.3g} "
+                f"to {omega.max():.3g}"
+            )
+        checked = [region for region in self.regions if region.confirmed is not None]
+        agree = sum(bool(region.confirmed) for region in checked)
+        lines.append(
+            f"  checked   the argument principle agrees in {agree} of {len(checked)} regions"
+        )
+        return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the chart; see `drillctrl.charts.figure.plot_chart`."""
         from drillctrl.charts.figure import plot_chart
 
-        return plot_chart(self, ax)
+        return plot_chart(
+            self.plane,
+            self.lines,
+            self.curves,
+            self.regions,
+            rows=self.rows,
+            level=self.level,
+            ax=ax,
+        )
 
     def __repr__(self) -> str:
         x, y = self.plane.x, self.plane.y
@@ -106,121 +142,6 @@ class StabilityChart:
             f"<StabilityChart {x.name} {x.low:g}:{x.high:g} × {y.name} {y.low:g}:{y.high:g}: "
             f"stable area {self.stable_area:.5g} ± {self.area_error:.1g}>"
         )
-
-
-def make_plane(
-    point: OperatingPoint | RigPoint,
-    x: AxisLike,
-    y: AxisLike,
-    structure: str | FeedbackStructure | None,
-    K1: npt.ArrayLike | None,
-    K2: npt.ArrayLike | None,
-) -> Plane:
-    """Check what a chart is drawn over.
-
-    Raises
-    ------
-    InputError
-        If axes, structure and gains do not fit together.
-    """
-    if isinstance(point, RigPoint):
-        where, rig_point = point.operating_point(), point
-    elif isinstance(point, OperatingPoint):
-        where, rig_point = point, None
-    else:
-        raise InputError("point", type(point).__name__, "an OperatingPoint or a RigPoint")
-    chosen = preset_structure(structure) if isinstance(structure, str) else structure
-    axes = [make_axis(axis, chosen, rig_point) for axis in (x, y)]
-    if chosen is None:
-        if K1 is not None or K2 is not None:
-            raise InputError("structure", "(missing)", "given together with gains")
-        now = past = np.zeros((0, 0))
-    else:
-        over = {axis.name for axis in axes}
-        if K1 is None and not all(n in over for n in chosen.gain_names if n.startswith("K1")):
-            raise InputError("K1", "(missing)", f"given for structure {chosen.name}")
-        if K2 is None and not all(n in over for n in chosen.gain_names if n.startswith("K2")):
-            raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
-        none = np.zeros(chosen.K1_lower.shape)
-        now, past = gain_matrices(chosen, none if K1 is None else K1, none if K2 is None else K2)
-    plane = Plane(where, rig_point, chosen, now, past, *axes)
-    check_plane(plane)
-    return plane
-
-
-def _transposed(plane: Plane, rows: bool) -> Any:
-    """Return matrices(position, along) for lines held at y (rows) or at x."""
-    if rows:
-        return lambda position, along: plane.matrices(along, position)
-    return plane.matrices
-
-
-def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
-    """Whether the characteristic function is affine in the scanned parameter."""
-    if scanned.name in ("omega0", "speed"):
-        return False
-    matrices = _transposed(plane, rows)
-    t = held.low + held.span * np.array([0.31, 0.83])
-    tables = []
-    for share in (0.0, 0.37, 1.0):
-        loops = from_matrices(*matrices(t, np.full(2, scanned.low + share * scanned.span)))
-        tables.append(np.pad(loops.coefficients, ((0, 0), (0, 0), (0, 4)))[:, :, :4])
-    middle = tables[0] + 0.37 * (tables[2] - tables[0])
-    return bool(np.abs(middle - tables[1]).max() <= 1e-9 * np.abs(tables[1]).max())
-
-
-def choose_scanner(plane: Plane, level: float) -> tuple[str, bool, Scanner]:
-    """Return the method, whether its lines are rows, and the scanner."""
-    x, y = plane.x, plane.y
-    if level == 0.0:
-        for scanned, rows in ((x, True), (y, False)):
-            if scanned.name == "omega0":
-                return "delay", rows, _delay_scanner(plane, scanned, rows=rows)
-    for scanned, held, rows in ((y, x, False), (x, y, True)):
-        if _is_affine(plane, held, scanned, rows=rows):
-            return "affine", rows, _affine_scanner(plane, scanned, level, rows=rows)
-    return "counting", False, _counting_scanner(plane, level)
-
-
-def _delay_scanner(plane: Plane, scanned: Axis, *, rows: bool) -> Scanner:
-    matrices = _transposed(plane, rows)
-    turn = 2.0 * np.pi / plane.point.blades
-
-    def scan(positions: FloatArray) -> list[ScanLine]:
-        loops = from_matrices(*matrices(positions, np.full(positions.size, scanned.high)))
-        return scan_rotary_speed(loops, positions, scanned.low, scanned.high, turn)
-
-    return scan
-
-
-def _affine_scanner(plane: Plane, scanned: Axis, level: float, *, rows: bool) -> Scanner:
-    matrices = _transposed(plane, rows)
-    low, high = scanned.low, scanned.high
-
-    def scan(positions: FloatArray) -> list[ScanLine]:
-        ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
-        loops = affine_loops(ends[0], ends[1], low, high, level)
-        return scan_affine(loops, positions, low, high, level)
-
-    return scan
-
-
-def _counting_scanner(plane: Plane, level: float) -> Scanner:
-    low, high = first_position(plane.y), plane.y.high
-
-    def scan(positions: FloatArray) -> list[ScanLine]:
-        return scan_counting(plane.matrices, positions, low, high, level)
-
-    return scan
-
-
-def first_position(axis: Axis) -> float:
-    """Return where lines may begin: ω0 and the rotary speed exclude zero."""
-    if axis.name in ("omega0", "speed") and axis.low == 0.0:
-        return _SHORTEST_DELAY_SHARE * axis.high
-    if axis.name == "rock_strength" and axis.low == 0.0:
-        return 1e-9 * axis.high
-    return axis.low
 
 
 def chart(

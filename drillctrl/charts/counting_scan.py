@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.charts.affine_scan import AffineLoops, count_roots, frequency_grid
 from drillctrl.charts.scan import IntArray, ScanLine
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
 
 Matrices = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]

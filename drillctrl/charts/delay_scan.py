@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.charts.scan import ScanLine
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.quasipolynomial import Quasipolynomials
 
 # Lobes that are listed one by one; below the ω0 of the last one a bound decides.

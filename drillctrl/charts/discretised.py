@@ -13,17 +13,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.figure import GREY, ORANGE, new_axes
 from drillctrl.charts.axes import GROUPS, Axis, make_axis
-from drillctrl.charts.chart import AxisLike, StabilityChart, chart, make_plane
+from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.figure import axis_text, draw_curves
-from drillctrl.delay.structure import FeedbackStructure, close_loop, preset_structure
-from drillctrl.delay.system import plant_system
+from drillctrl.charts.plane import AxisLike, make_plane
+from drillctrl.delay.closing import close_loop
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
 from drillctrl.designs.result import Design
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.drilling.structures import as_structure
 from drillctrl.spectrum.semidiscretization import semidiscretize
 
 if TYPE_CHECKING:
@@ -117,7 +120,7 @@ def gain_surface(
     InputError
         If the structure has not two gains, or a number is out of range.
     """
-    chosen = preset_structure(structure) if isinstance(structure, str) else structure
+    chosen = as_structure(structure)
     number = checked_integer("count", count, 2, 1001)
     if len(chosen.gain_names) != 2:
         raise InputError("structure", chosen.name, "one with two gains")

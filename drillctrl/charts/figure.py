@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, stable_strips
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
-    from drillctrl.charts.chart import StabilityChart
+    from drillctrl.base.arrays import FloatArray
     from drillctrl.charts.plane import Plane
-    from drillctrl.charts.stabilisable import StabilisableChart
-    from drillctrl.spectrum.characteristic import FloatArray
+    from drillctrl.charts.regions import Region
+    from drillctrl.charts.scan import ScanLine
 
     Scale = Callable[[Any], Any]
 
@@ -120,7 +120,7 @@ def _anticlockwise(polygon: FloatArray) -> FloatArray:
 
 
 def draw_curves(
-    ax: Axes, curves: tuple[Curve, ...], colour: str, label: str, style: str = "-"
+    ax: Axes, curves: Sequence[Curve], colour: str, label: str, style: str = "-"
 ) -> None:
     """Draw boundary curves under one legend entry."""
     for curve in curves:
@@ -131,23 +131,66 @@ def draw_curves(
         label = "_nolegend_"
 
 
-def plot_chart(chart: StabilityChart, ax: Axes | None = None) -> Axes:
+class Charted(Protocol):
+    """What charts have in common that are drawn over each other."""
+
+    @property
+    def plane(self) -> Plane:
+        """The two parameters."""
+
+    @property
+    def lines(self) -> Sequence[ScanLine]:
+        """Scanned lines, from which the shading is made."""
+
+    @property
+    def rows(self) -> bool:
+        """Whether lines are held at y."""
+
+    @property
+    def curves(self) -> Sequence[Curve]:
+        """The boundary."""
+
+    @property
+    def stable_area(self) -> float:
+        """For the legend."""
+
+
+def plot_chart(
+    plane: Plane,
+    lines: Sequence[ScanLine],
+    curves: Sequence[Curve],
+    regions: Sequence[Region],
+    *,
+    rows: bool,
+    level: float = 0.0,
+    ax: Axes | None = None,
+) -> Axes:
     """Draw one chart: the stable set shaded, the boundary by the frequency that rules it.
 
     Parameters
     ----------
-    chart : StabilityChart
-        Of `chart`.
+    plane : Plane
+        The two parameters.
+    lines : sequence of ScanLine
+        Scanned lines, from which the shading is made.
+    curves : sequence of Curve
+        The boundary.
+    regions : sequence of Region
+        Parts whose numbers of roots are written into them.
+    rows : bool
+        Whether lines are held at y.
+    level : float
+        σ of the chart.
     ax : Axes, optional
         By default new ones.
     """
     from matplotlib.collections import LineCollection
 
     ax = new_axes() if ax is None else ax
-    word = "stable" if chart.level == 0.0 else f"all roots left of {chart.level:g}"
-    draw_strips(ax, stable_strips(chart.lines, rows=chart.rows), BLUE, word)
+    word = "stable" if level == 0.0 else f"all roots left of {level:g}"
+    draw_strips(ax, stable_strips(lines, rows=rows), BLUE, word)
     pieces, speeds = [], []
-    for curve in chart.curves:
+    for curve in curves:
         steps = np.stack([curve.points[:-1], curve.points[1:]], axis=1)
         pieces.append(steps)
         speeds.append(np.maximum(curve.omega[:-1], curve.omega[1:]))
@@ -159,20 +202,20 @@ def plot_chart(chart: StabilityChart, ax: Axes | None = None) -> Axes:
         ax.add_collection(drawn, autolim=False)
         figure = ax.get_figure(root=True)
         assert figure is not None
-        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if chart.plane.rig_point else 0.02)
+        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
         bar.set_label("frequency of the crossing root, |Im s|")
-    _label_regions(ax, chart)
-    label_axes(ax, chart.plane)
-    ax.set_title(plane_title(chart.plane), fontsize="medium")
-    counted = "unstable roots" if chart.level == 0.0 else "roots farther right"
+    _label_regions(ax, plane, regions)
+    label_axes(ax, plane)
+    ax.set_title(plane_title(plane), fontsize="medium")
+    counted = "unstable roots" if level == 0.0 else "roots farther right"
     ax.legend(loc="best", fontsize="small", title=f"numbers: {counted}", title_fontsize="small")
     return ax
 
 
-def _label_regions(ax: Axes, chart: StabilityChart) -> None:
+def _label_regions(ax: Axes, plane: Plane, regions: Sequence[Region]) -> None:
     """Write the number of unstable roots into the larger regions."""
-    whole = chart.plane.x.span * chart.plane.y.span
-    for region in chart.regions:
+    whole = plane.x.span * plane.y.span
+    for region in regions:
         if region.unstable_roots and region.area > 0.02 * whole:
             ax.annotate(
                 str(region.unstable_roots),
@@ -184,14 +227,12 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
             )
 
 
-def plot_charts(
-    charts: Mapping[str, StabilityChart | StabilisableChart], ax: Axes | None = None
-) -> Axes:
+def plot_charts(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
     """Compare charts over the same axes: structures, rocks, dampings or decay rates.
 
     Parameters
     ----------
-    charts : mapping of str to StabilityChart or StabilisableChart
+    charts : mapping of str to StabilityChart or StabilisableChart, or the like
         By the label in the legend; all over the same two parameters.
     ax : Axes, optional
         By default new ones.

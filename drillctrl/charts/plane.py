@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.charts.axes import RIG_AXES, Axis, to_si_factor
-from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
-from drillctrl.delay.system import DelaySystem, plant_system
-from drillctrl.drilling.plant import (
-    PARAMETER_NAMES,
-    dimensionless_plant,
-    linearisation,
-    parameter_vector,
-)
+from drillctrl.charts.axes import RIG_AXES, Axis, make_axis, to_si_factor
+from drillctrl.delay.closing import close_loop, gain_matrices
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import DelaySystem
+from drillctrl.designs.loops import gains_along, loop_arrays
+from drillctrl.drilling.coefficients import PARAMETER_NAMES
+from drillctrl.drilling.linear import parameter_vector, plant_system
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices
+from drillctrl.drilling.structures import as_structure
+
+AxisLike = Axis | Sequence[object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,40 +83,15 @@ class Plane:
 
     def _gains(self, values: dict[str, FloatArray], count: int) -> tuple[FloatArray, FloatArray]:
         """Return K1 and K2 of every place, each (N, m, p)."""
-        assert self.structure is not None
-        flat = np.concatenate([self.K1.ravel(), self.K2.ravel()])
-        table = np.tile(flat, (count, 1))
-        columns = self.structure.spread.T
-        for name, column in zip(self.structure.gain_names, columns, strict=True):
-            if name in values:
-                # A gain takes along those that are tied to it.
-                table[:, column != 0.0] = 0.0
-                table += np.outer(values[name], column)
-        half, shape = flat.size // 2, self.K1.shape
-        return table[:, :half].reshape(-1, *shape), table[:, half:].reshape(-1, *shape)
+        if self.structure is None:
+            return self.K1, self.K2
+        return gains_along(self.structure, self.K1, self.K2, values, count)
 
     def matrices(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return A0 (N, n, n), A1 (N, n, n) and τ (N,) of the loops at N places."""
-        count = x.size
         values = {self.x.name: x, self.y.name: y}
-        table = self._parameters(values, count)
-        a0, a1, _drive, tau = (
-            value.full() for value in linearisation(dimensionless_plant())(table.T)
-        )
-        n = a0.shape[0]
-        a0 = a0.reshape(n, count, n).transpose(1, 0, 2)
-        a1 = a1.reshape(n, count, n).transpose(1, 0, 2)
-        if self.structure is not None:
-            inputs, outputs = loop_channels(
-                plant_system(self.point, self.structure.inputs), self.structure
-            )
-            now, past = self._gains(values, count)
-            a0, a1 = a0 + inputs @ now @ outputs, a1 + inputs @ past @ outputs
-        return np.ascontiguousarray(a0), np.ascontiguousarray(a1), tau.ravel()
-
-    def quasipolynomials(self, x: FloatArray, y: FloatArray) -> Quasipolynomials:
-        """Return the characteristic functions at N places."""
-        return from_matrices(*self.matrices(x, y))
+        table = self._parameters(values, x.size)
+        return loop_arrays(self.point, table.T, self.structure, *self._gains(values, x.size))
 
     def operating_point(self, x: float, y: float) -> OperatingPoint:
         """Return the operating point at one place."""
@@ -147,3 +127,66 @@ def check_plane(plane: Plane) -> None:
     both_rig = plane.x.name in RIG_AXES and plane.y.name in RIG_AXES
     if plane.x.name == plane.y.name or (first & second and not both_rig):
         raise InputError("y", plane.y.name, f"another parameter than x = {plane.x.name}")
+
+
+def make_plane(
+    point: OperatingPoint | RigPoint,
+    x: AxisLike,
+    y: AxisLike,
+    structure: str | FeedbackStructure | None,
+    K1: npt.ArrayLike | None,
+    K2: npt.ArrayLike | None,
+) -> Plane:
+    """Check what a chart is drawn over.
+
+    Raises
+    ------
+    InputError
+        If axes, structure and gains do not fit together.
+    """
+    if isinstance(point, RigPoint):
+        where, rig_point = point.operating_point(), point
+    elif isinstance(point, OperatingPoint):
+        where, rig_point = point, None
+    else:
+        raise InputError("point", type(point).__name__, "an OperatingPoint or a RigPoint")
+    chosen = None if structure is None else as_structure(structure)
+    axes = [make_axis(axis, chosen, rig_point) for axis in (x, y)]
+    if chosen is None:
+        if K1 is not None or K2 is not None:
+            raise InputError("structure", "(missing)", "given together with gains")
+        now = past = np.zeros((0, 0))
+    else:
+        over = {axis.name for axis in axes}
+        if K1 is None and not all(n in over for n in chosen.gain_names if n.startswith("K1")):
+            raise InputError("K1", "(missing)", f"given for structure {chosen.name}")
+        if K2 is None and not all(n in over for n in chosen.gain_names if n.startswith("K2")):
+            raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
+        none = np.zeros(chosen.K1_lower.shape)
+        now, past = gain_matrices(chosen, none if K1 is None else K1, none if K2 is None else K2)
+    plane = Plane(where, rig_point, chosen, now, past, *axes)
+    check_plane(plane)
+    return plane
+
+
+def plane_fields(plane: Plane) -> dict[str, Any]:
+    """Return what a chart was drawn over."""
+    structure = plane.structure
+    axes = {
+        key: {"name": axis.name, "low": axis.low, "high": axis.high, "unit": axis.unit or None}
+        for key, axis in (("x", plane.x), ("y", plane.y))
+    }
+    return {
+        "operating_point": dataclasses.asdict(plane.point),
+        "axes": axes,
+        "structure": structure.name if structure else None,
+        "K1": plane.K1.ravel().tolist(),
+        "K2": plane.K2.ravel().tolist(),
+    }
+
+
+def area_text(area: float, error: float, plane: Plane) -> str:
+    """Return an area with its error and its share of the chart."""
+    digits = max(0, min(6, -math.floor(math.log10(max(error, 1e-12)))))
+    share = area / (plane.x.span * plane.y.span)
+    return f"{area:.{digits}f} ± {error:.1g} ({share:.1%} of the chart)"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 

@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.charts.axes import Axis
-from drillctrl.charts.chains import Curve, stable_curves
-from drillctrl.charts.chart import AxisLike, chart, first_position, make_plane
-from drillctrl.charts.plane import Plane
+from drillctrl.charts.chains import Curve, curve_fields, stable_curves
+from drillctrl.charts.chart import chart
+from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
 from drillctrl.charts.scan import ScanLine
+from drillctrl.charts.scanners import first_position
 from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
 from drillctrl.charts.sweep import sweep
-from drillctrl.delay.structure import FeedbackStructure, preset_structure
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.structures import as_structure
 from drillctrl.synthesis.gain_margin import check_gains
 
 if TYPE_CHECKING:
@@ -93,15 +95,69 @@ class StabilisableChart:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
-        from drillctrl.charts.export import stabilisable_fields
-
-        return stabilisable_fields(self)
+        structure = self.structure
+        return {
+            "schema": "drillctrl/chart/1",
+            **plane_fields(self.plane),
+            "structure": structure.name,
+            "K1": None,
+            "K2": None,
+            "optimised": True,
+            "bounds": {
+                name: [low, high]
+                for name, low, high in zip(
+                    structure.gain_names,
+                    structure.lower.tolist(),
+                    structure.upper.tolist(),
+                    strict=True,
+                )
+            },
+            "level": self.level,
+            "stable_area": self.stable_area,
+            "stable_area_error": self.area_error,
+            "undecided_area": self.undecided_area,
+            "open_loop_area": self.open_loop.stable_area,
+            "open_loop_area_error": self.open_loop.area_error,
+            "area_ratio": self.area_ratio,
+            "area_ratio_error": self.area_ratio_error,
+            "boundaries": [curve.points.tolist() for curve in self.curves],
+            "boundary_details": [curve_fields(curve) for curve in self.curves],
+            "method": "gain curves",
+            "samples": self.samples,
+            "elapsed_seconds": self.elapsed_seconds,
+        }
 
     def summary(self) -> str:
         """Return a text for people."""
-        from drillctrl.charts.export import stabilisable_summary
-
-        return stabilisable_summary(self)
+        plane, structure = self.plane, self.structure
+        bounds = ", ".join(
+            f"{name} in [{low:g}, {high:g}]"
+            for name, low, high in zip(
+                structure.gain_names, structure.lower, structure.upper, strict=True
+            )
+        )
+        goal = "stabilise" if self.level == 0.0 else f"put all roots left of {self.level:g}"
+        alone = self.open_loop
+        lines = [
+            f"Where some gains of {structure.name} {goal}",
+            f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
+            f"{plane.y.label} in [{plane.y.low:g}, {plane.y.high:g}]",
+            f"  bounds    {bounds}",
+            f"  reached   {area_text(self.stable_area, self.area_error, plane)}",
+            f"  open loop {area_text(alone.stable_area, alone.area_error, plane)}",
+        ]
+        if self.area_ratio is not None and self.area_ratio_error is not None:
+            lines.append(f"  ratio     {self.area_ratio:.4g} ± {self.area_ratio_error:.1g}")
+        if self.undecided_area > 0.0:
+            lines.append(
+                f"  undecided {self.undecided_area:.4g} at the lowest rotary speeds, "
+                "where the delay exceeds 2.1"
+            )
+        lines.append(
+            f"  sampled   {len(self.lines)} lines, {self.samples} places each before refinement; "
+            "smaller islands may be missed"
+        )
+        return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the set and the open loop's; see `drillctrl.charts.figure.plot_charts`."""
@@ -164,7 +220,7 @@ def stabilisable_chart(
     """
     began = time.perf_counter()
     plane = make_plane(point, x, y, None, None, None)
-    chosen = preset_structure(structure) if isinstance(structure, str) else structure
+    chosen = as_structure(structure)
     check_gains(chosen.lower.size)
     checked_number("level", level, -100.0, 100.0)
     checked_number("tolerance", tolerance, 1e-6, 0.1)

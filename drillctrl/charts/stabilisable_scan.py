@@ -13,11 +13,11 @@ from collections.abc import Callable
 import numpy as np
 import scipy.optimize
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import plant_system
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.drilling.linear import plant_system
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.gain_margin import GainMargin, gain_margin
 

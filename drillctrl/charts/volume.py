@@ -6,27 +6,26 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.files import replacing
 from drillctrl.charts.axes import GROUPS, Axis, make_axis
-from drillctrl.charts.chart import (
-    AxisLike,
-    StabilityChart,
-    chart,
-    choose_scanner,
-    first_position,
-    make_plane,
-)
-from drillctrl.charts.plane import Plane
+from drillctrl.charts.chains import stable_curves
+from drillctrl.charts.chart import StabilityChart, chart
+from drillctrl.charts.plane import AxisLike, Plane, make_plane
 from drillctrl.charts.scan import ScanLine
+from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.spectrum.characteristic import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 # What a mesh is written as, by the file's ending.
 MESH_FORMATS: dict[str, dict[str, Any]] = {
@@ -176,7 +175,26 @@ class StabilityVolume:
         """Draw the surface; see `drillctrl.charts.volume_figure.plot_volume`."""
         from drillctrl.charts.volume_figure import plot_volume
 
-        return plot_volume(self, ax)
+        title = f"Boundary of the stable set, volume {self.volume:.4g} ± {self.volume_error:.1g}"
+        return plot_volume(*self.surface(), self.planes[0], self.z, title, ax)
+
+    def plot_slices(self, count: int = 6, ax: Axes | None = None) -> Axes:
+        """Draw the boundaries of some slices over each other (Figs. 6, 7).
+
+        Parameters
+        ----------
+        count : int
+            How many, evenly chosen; the first, which may be empty, left out.
+        ax : Axes, optional
+            By default new ones.
+        """
+        from drillctrl.charts.volume_figure import plot_slices
+
+        chosen = np.unique(np.linspace(0, len(self.positions) - 1, count + 1).astype(int)[1:])
+        slices = {
+            float(self.positions[k]): stable_curves(self.lines[k], rows=self.rows) for k in chosen
+        }
+        return plot_slices(slices, self.planes[0], self.z, ax)
 
     def __repr__(self) -> str:
         return f"<StabilityVolume over {self.z.name}: {self.volume:.5g} ± {self.volume_error:.1g}>"

@@ -177,7 +177,7 @@ def _optimised(
     bound: tuple[str, ...],
 ) -> StabilisableChart:
     from drillctrl.charts.stabilisable import stabilisable_chart
-    from drillctrl.delay.structure import preset_structure
+    from drillctrl.drilling.structures import preset_structure
 
     for name, given in zip(("--K1", "--K2"), gains, strict=True):
         if given is not None:

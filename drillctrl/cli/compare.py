@@ -17,7 +17,8 @@ from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
-    from drillctrl.studies.compare import Comparison, Given, Progress
+    from drillctrl.studies.compare import Given, Progress
+    from drillctrl.studies.comparison import Comparison
 
 ENDINGS = (".html", ".csv", ".json")
 

@@ -82,7 +82,8 @@ def read_objective(options: dict[str, Any]) -> Objective:
     InputError
         If the objective is unknown, or an option belongs to another one.
     """
-    from drillctrl.synthesis.objectives import Exact, Robust, SemiDiscrete, WorstCase
+    from drillctrl.designs.worst_case import WorstCase
+    from drillctrl.synthesis.objectives import Exact, Robust, SemiDiscrete
 
     kinds: dict[str, Callable[..., Objective]] = {
         "exact": Exact,

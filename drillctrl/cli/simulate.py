@@ -97,11 +97,10 @@ def simulate_command(
         raise InputError("--start", start, "steady or rest")
     where = read_point(options)
     from drillctrl.drilling.point import RigPoint
-    from drillctrl.simulation import simulate
     from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
-    from drillctrl.simulation.run import checked_run
+    from drillctrl.simulation.run import checked_run, simulate
 
     if out is not None:
         check_export_path(out)
@@ -147,13 +146,12 @@ def simulate_command(
 def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure:
     from drillctrl.simulation.figure import (
         plot_against_linear,
-        plot_motion,
         plot_phase_portrait,
         plot_rock_face,
     )
 
     if figure == "motion":
-        return plot_motion(run)
+        return run.plot()
     if figure == "linear":
         ax = plot_against_linear(run, again("linear"))
     elif figure == "face":

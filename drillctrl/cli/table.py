@@ -135,7 +135,7 @@ def _design(
 ) -> tuple[GainTable, Checkpoint | None]:
     """Return the table that the options ask for, and where its designs are kept."""
     from drillctrl.base.checkpoint import Checkpoint
-    from drillctrl.delay.structure import preset_structure
+    from drillctrl.drilling.structures import preset_structure
     from drillctrl.synthesis.objectives import Exact
     from drillctrl.tables.table import table
 

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.plant import (
-    Plant,
-    dimensionless_plant,
-    linearisation,
-    parameter_vector,
-)
-from drillctrl.drilling.point import OperatingPoint
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _matrix(name: str, value: npt.ArrayLike, shape: tuple[int | None, int | None]) -> FloatArray:
@@ -161,42 +152,3 @@ def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     left[rows] = scipy.linalg.lstsq(right.T, matrix[rows].T)[0].T
     left[kept] = np.eye(rank)
     return left, right
-
-
-def plant_system(
-    point: OperatingPoint,
-    inputs: Sequence[str] = ("torque",),
-    plant: Plant | None = None,
-) -> DelaySystem:
-    """Return the linear delayed plant at an operating point (Eqs. 23, 25, 26, 34, 35).
-
-    Parameters
-    ----------
-    point : OperatingPoint
-        Its groups are the plant's parameters.
-    inputs : sequence of str
-        Which of the plant's inputs are driven: ``"torque"`` (the paper's u), ``"axial"``.
-    plant : Plant, optional
-        A plant with the same parameters as `dimensionless_plant`, which is the default.
-
-    Returns
-    -------
-    DelaySystem
-        All states are outputs.
-    """
-    plant = dimensionless_plant() if plant is None else plant
-    for name in inputs:
-        if name not in plant.input_names:
-            raise InputError("inputs", name, f"among {', '.join(plant.input_names)}")
-    a1, a2, b, tau0 = (value.full() for value in linearisation(plant)(parameter_vector(point)))
-    driven = [plant.input_names.index(name) for name in inputs]
-    return DelaySystem(
-        a1,
-        (a2,),
-        (float(tau0[0, 0]),),
-        b[:, driven],
-        np.eye(a1.shape[0]),
-        state_names=plant.state_names,
-        input_names=tuple(inputs),
-        output_names=plant.state_names,
-    )

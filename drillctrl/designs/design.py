@@ -9,45 +9,22 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
-from drillctrl.delay.structure import FeedbackStructure, gain_matrices, preset_structure
-from drillctrl.delay.system import DelaySystem, plant_system
+from drillctrl.delay.closing import gain_matrices
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER
-from drillctrl.designs.result import Design, Subject, assess
+from drillctrl.designs.remedies import Remedy, remedies
+from drillctrl.designs.result import Design, assess
+from drillctrl.designs.worst_case import WorstCase
+from drillctrl.drilling.case import Where, subject_of
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.plant import Plant
-from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.drilling.structures import as_structure
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis import problem
 from drillctrl.synthesis.family import LoopFamily, loop_family
-from drillctrl.synthesis.objectives import (
-    EXACT,
-    NO_REQUIREMENTS,
-    Objective,
-    Requirements,
-    WorstCase,
-)
-
-Where = OperatingPoint | RigPoint | DelaySystem
-
-
-def _as_structure(given: str | FeedbackStructure) -> FeedbackStructure:
-    return preset_structure(given) if isinstance(given, str) else given
-
-
-def _subject(where: Where, inputs: tuple[str, ...], physics: Plant | None) -> Subject:
-    if isinstance(where, DelaySystem):
-        if physics is not None:
-            raise InputError("plant", "given", "left out beside a DelaySystem")
-        return Subject(where, None, None, None)
-    if isinstance(where, RigPoint):
-        point, rig_point = where.operating_point(), where
-    elif isinstance(where, OperatingPoint):
-        point, rig_point = where, None
-    else:
-        kinds = "an OperatingPoint, a RigPoint or a DelaySystem"
-        raise InputError("point", type(where).__name__, kinds)
-    return Subject(plant_system(point, inputs, physics), point, rig_point, physics)
+from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
 
 
 def design(
@@ -92,9 +69,9 @@ def design(
         for without an operating point.
     """
     began = time.perf_counter()
-    chosen = _as_structure(structure).with_bounds(bounds or {})
+    chosen = as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
-    subject = _subject(point, chosen.inputs, plant)
+    subject = subject_of(point, chosen.inputs, plant)
     family = loop_family(subject.plant, chosen)
     others = []
     if isinstance(objective, WorstCase):
@@ -115,7 +92,12 @@ def design(
         optimality=solution.optimality,
         evaluations=solution.evaluations,
         elapsed_seconds=time.perf_counter() - began,
+        seek=_remedies,
     )
+
+
+def _remedies(failed: Design) -> tuple[Remedy, ...]:
+    return remedies(failed, design, analyze)
 
 
 def _meets(
@@ -167,16 +149,16 @@ def analyze(
         if K1 is not None or K2 is not None:
             raise InputError("structure", "(missing)", "given together with gains")
         none = np.zeros((0, 0))
-        result = assess(_subject(point, ("torque",), plant), None, none, none, m, order)
+        result = assess(subject_of(point, ("torque",), plant), None, none, none, m, order)
     else:
-        chosen = _as_structure(structure)
+        chosen = as_structure(structure)
         if K1 is None:
             raise InputError("K1", "(missing)", f"given for structure {chosen.name}")
         if K2 is None and (chosen.K2_upper.any() or chosen.K2_lower.any()):
             raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
         gains = gain_matrices(chosen, K1, K2)
-        result = assess(_subject(point, chosen.inputs, plant), chosen, *gains, m, order)
-    result = replace(result, elapsed_seconds=time.perf_counter() - began)
+        result = assess(subject_of(point, chosen.inputs, plant), chosen, *gains, m, order)
+    result = replace(result, elapsed_seconds=time.perf_counter() - began, seek=_remedies)
     if m is not None or order != DEFAULT_ORDER:
         # Refused now rather than when it is read.
         _ = result.spectral_radius

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drillctrl.base.text import finite_or_none
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.result import Design
+from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import steady_state
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import Root
+
+if TYPE_CHECKING:
+    from drillctrl.designs.result import Design
+
 
 # Share of the decay rate that the alternative beside a design may lose.
 GIVE_UP = 0.05
-
-
-def finite_or_none(value: float) -> float | None:
-    """Return a float that JSON can hold; None for what is not finite."""
-    return float(value) if math.isfinite(value) else None
 
 
 def design_fields(design: Design) -> dict[str, Any]:
@@ -167,22 +165,6 @@ def _loop_fields(design: Design) -> dict[str, Any]:
             **dataclasses.asdict(loop.certificate),
         },
     }
-
-
-def gain_units(structure: FeedbackStructure, rig_point: RigPoint) -> tuple[FloatArray, list[str]]:
-    """Return the SI value of each unit gain of one row, and its unit.
-
-    A torque is counted in Kt per rad, a rate in radians per time unit; an axial force in
-    the rig's axial force unit.
-    """
-    rig = rig_point.rig
-    factors, names = [], []
-    for output in structure.outputs:
-        rate, axial = output.startswith("d"), output.endswith("x")
-        scale = rig.torsional_stiffness * (rig.time_scale if rate else 1.0)
-        factors.append(scale / (rig.axial_scale if axial else 1.0))
-        names.append(f"N·m{'·s' if rate else ''}/{'m' if axial else 'rad'}")
-    return np.array(factors), names
 
 
 def _rig_fields(rig_point: RigPoint, design: Design) -> dict[str, Any]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drillctrl.delay.structure import STRUCTURE_NAMES, FeedbackStructure, preset_structure
-from drillctrl.delay.system import plant_system
-from drillctrl.designs.design import analyze, design
-from drillctrl.designs.result import Design
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.plant import dimensionless_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.drilling.structures import feed
+from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structure
 from drillctrl.spectrum.roots import spectral_abscissa
+
+if TYPE_CHECKING:
+    from drillctrl.designs.result import Design
+
 
 # How much faster the bit is let turn, and in how many steps that is looked at.
 _FASTEST = 4.0
@@ -63,7 +66,9 @@ class Remedy:
         }
 
 
-def remedies(failed: Design) -> tuple[Remedy, ...]:
+def remedies(
+    failed: Design, design: Callable[..., Design], analyze: Callable[..., Design]
+) -> tuple[Remedy, ...]:
     """Return what stabilises the point of a design that is not stable.
 
     Tried are the presets that allow more than the structure, within the paper's bounds, the
@@ -75,6 +80,8 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
     ----------
     failed : Design
         Of a point.
+    design, analyze : callable
+        The verbs, which know how to find gains for a candidate.
 
     Returns
     -------
@@ -93,7 +100,7 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
         result = design(where, candidate, plant=failed.physics)
         if result.stable:
             found.append(Remedy(kind, candidate.name, result))
-    faster = _stable_speed(failed)
+    faster = _stable_speed(failed, analyze)
     return tuple(found) if faster is None else (*found, Remedy("speed", "none", faster))
 
 
@@ -137,7 +144,7 @@ def _ranges(structure: FeedbackStructure) -> dict[tuple[str, str, str], _Range]:
     }
 
 
-def _stable_speed(failed: Design) -> Design | None:
+def _stable_speed(failed: Design, analyze: Callable[..., Design]) -> Design | None:
     """Return the open loop at the lowest higher speed found at which it is stable."""
     point = failed.point
     assert point is not None

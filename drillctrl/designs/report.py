@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from drillctrl.base import units
-from drillctrl.designs.fields import GIVE_UP, gain_units, has_alternative
+from drillctrl.designs.fields import GIVE_UP, has_alternative
 from drillctrl.designs.loop_analysis import LoopAnalysis
-from drillctrl.designs.result import Design
+from drillctrl.designs.worst_case import WorstCase
+from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.steady import steady_state
 from drillctrl.robustness.margins import ParameterMargin
-from drillctrl.synthesis.objectives import Robust, SemiDiscrete, WorstCase
+from drillctrl.synthesis.objectives import Robust, SemiDiscrete
+
+if TYPE_CHECKING:
+    from drillctrl.designs.result import Design
+
 
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
 _GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import functools
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.structure import FeedbackStructure, close_loop
+from drillctrl.delay.closing import close_loop
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
+from drillctrl.designs.fragility import Fragility, fragility, perturbed_plants
 from drillctrl.designs.loop_analysis import (
     DEFAULT_ORDER,
-    Fragility,
     LoopAnalysis,
     SpectralRadius,
     analyze_loop,
     discretised_radius,
-    fragility,
-    perturbed_plants,
 )
+from drillctrl.designs.margins import point_margins
+from drillctrl.drilling.case import Subject
 from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin, point_margins
+from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin
 from drillctrl.robustness.radius import StabilityRadius, stability_radius
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.synthesis.alternative import robust_alternative
 from drillctrl.synthesis.boundary import BoundaryDecision, decide
 from drillctrl.synthesis.certificate import OptimalityCertificate
@@ -41,16 +43,6 @@ if TYPE_CHECKING:
 
 # How far left of a design its explicit boundary is asked for better gains.
 _LEFT = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """What is designed for: a plant, and where it drills as far as that is known."""
-
-    plant: DelaySystem
-    point: OperatingPoint | None
-    rig_point: RigPoint | None
-    physics: Plant | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +83,8 @@ class Design:
         Eigenvalue problems that the search solved; 0 for given gains.
     elapsed_seconds : float
         Wall time.
+    seek : callable or None
+        Finds `remedies` when they are asked for.
     """
 
     plant: DelaySystem
@@ -110,6 +104,7 @@ class Design:
     optimality: OptimalityCertificate | None = None
     evaluations: int = 0
     elapsed_seconds: float = 0.0
+    seek: Callable[[Design], tuple[Remedy, ...]] | None = None
 
     @property
     def spectral_abscissa(self) -> float:
@@ -181,10 +176,8 @@ class Design:
 
     @functools.cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """What else stabilises the point, if these gains do not; see `remedies.remedies`."""
-        from drillctrl.designs.remedies import remedies
-
-        return remedies(self)
+        """What else stabilises the point, if these gains do not."""
+        return () if self.seek is None else self.seek(self)
 
     def _perturbed(self) -> dict[str, DelaySystem]:
         return perturbed_plants(self.plant, self.point, self.physics)
@@ -248,9 +241,12 @@ class Design:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the rightmost roots with and without feedback; see `plot_roots`."""
-        from drillctrl.base.figure import plot_roots
+        from drillctrl.designs.figure import plot_roots
 
-        return plot_roots(self, ax)
+        loops = {"without control": self.plant}
+        if self.structure is not None:
+            loops[f"with {self.structure.name}"] = self.system()
+        return plot_roots(loops, self.loop.dominant_roots, self.point, ax)
 
     def __repr__(self) -> str:
         name = self.structure.name if self.structure else "open loop"

@@ -11,10 +11,8 @@ import functools
 from dataclasses import replace
 
 import casadi as ca
-import numpy as np
 
 from drillctrl.base.errors import checked_number
-from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.plant import Plant, dimensionless_plant
 
 
@@ -54,29 +52,4 @@ def top_drive_plant(inertia_ratio: float) -> Plant:
         rhs=ca.vertcat(bit, top[1], (twist + drive) / ratio),
         state_names=(*base.state_names, "phi", "dphi"),
         input_names=(*base.input_names, "drive"),
-    )
-
-
-def soft_torque(stiffness: float = 10.0, damping: float = 10.0) -> FeedbackStructure:
-    """Return PI speed control of a top drive: drive = −k φ − d φ' (soft torque).
-
-    Parameters
-    ----------
-    stiffness, damping : float
-        Largest k and d, in units of Kt and of the root of Kt times the bit's inertia. Matched
-        impedance is d near 1; a stiff drive has both large.
-    """
-    most = [
-        checked_number("stiffness", stiffness, 0.0, 1e9, open_low=True),
-        checked_number("damping", damping, 0.0, 1e9, open_low=True),
-    ]
-    nothing = np.zeros((1, 2))
-    return FeedbackStructure(
-        "soft-torque",
-        ("phi", "dphi"),
-        -np.array([most]),
-        nothing,
-        nothing,
-        nothing,
-        inputs=("drive",),
     )

@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
+
 from drillctrl.base.errors import InputError, checked_number, interval_text
-from drillctrl.drilling.plant import (
+from drillctrl.drilling.bit_rock import BitRock, bit_rock
+from drillctrl.drilling.coefficients import (
     RIG_PARAMETER_NAMES,
     Coefficients,
+    Expression,
     rig_coefficients,
-    steady_delay,
-    steady_depth,
-    steady_load,
-    steady_offsets,
 )
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
+from drillctrl.drilling.string import equations_of_motion
 
 
 @dataclass(frozen=True)
@@ -101,3 +102,26 @@ def rig_point_at_weight_on_bit(rig: Rig, rotary_speed: float, weight_on_bit: flo
         limits = interval_text(idle)
         raise InputError("weight_on_bit", wanted, f"{limits} N (the wear flat carries {idle:g} N)")
     return RigPoint(rig, rotary_speed, (wanted - idle) / (unit - idle))
+
+
+def steady_depth(c: Coefficients) -> Expression:
+    """d0 = 2π V0/Ω0, total depth of cut per revolution in steady drilling (Eq. 11)."""
+    return 2 * np.pi * (c.penetration_rate / c.rotary_speed)
+
+
+def steady_delay(c: Coefficients) -> Expression:
+    """2π/(n Ω0), the delay of steady drilling (Eq. 18)."""
+    return 2 * np.pi / (c.blades * c.rotary_speed)
+
+
+def steady_load(c: Coefficients) -> BitRock:
+    """Weight on bit and torque on bit in steady drilling (Eqs. 2, 3, 10, 11)."""
+    return bit_rock(c, steady_depth(c), c.penetration_rate, c.rotary_speed)
+
+
+def steady_offsets(c: Coefficients) -> tuple[Expression, Expression]:
+    """z0 and φ0 of Eq. 12: the stretch and twist at which nothing accelerates."""
+    axial, angular = equations_of_motion(
+        c, 0.0, 0.0, c.penetration_rate, c.rotary_speed, steady_load(c), 0.0, 0.0
+    )
+    return axial * c.mass / c.axial_stiffness, angular * c.inertia / c.torsional_stiffness

@@ -1,19 +1,57 @@
-"""Feedback to the feed: an axial force on the string, instead of a torque or beside one."""
+"""Feedback of a drill string: the presets of torque, the feed, soft torque at the top."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.structure import (
-    ANGLE_BOUND,
-    RATE_BOUND,
-    FeedbackStructure,
-    FloatArray,
-    preset_structure,
-)
+from drillctrl.delay.structure import FeedbackStructure
 
+STRUCTURE_NAMES = ("p", "case1", "pd", "case2")
+ANGLE_BOUND = 10.0
+RATE_BOUND = 5.0
 AXIAL_OUTPUTS = ("x", "dx")
+
+
+def preset_structure(name: str) -> FeedbackStructure:
+    """Return a preset structure with the paper's bounds (Eqs. 37, 39, 43).
+
+    Parameters
+    ----------
+    name : str
+        ``"p"``: θ; ``"case1"``: θ and delayed θ; ``"pd"``: θ and θ';
+        ``"case2"``: θ and θ', both also delayed.
+
+    Raises
+    ------
+    InputError
+        If there is no such preset.
+    """
+    presets = {
+        "p": ((ANGLE_BOUND,), False),
+        "case1": ((ANGLE_BOUND,), True),
+        "pd": ((ANGLE_BOUND, RATE_BOUND), False),
+        "case2": ((ANGLE_BOUND, RATE_BOUND), True),
+    }
+    if name not in presets:
+        raise InputError("structure", name, f"one of {', '.join(presets)}")
+    bounds, delayed = presets[name]
+    return _torque_structure(name, bounds, delayed=delayed)
+
+
+def as_structure(given: str | FeedbackStructure) -> FeedbackStructure:
+    """Return a structure that is given as such or by the name of a preset."""
+    return preset_structure(given) if isinstance(given, str) else given
+
+
+def _torque_structure(name: str, bounds: Sequence[float], *, delayed: bool) -> FeedbackStructure:
+    box = np.array([bounds])
+    past = box if delayed else np.zeros_like(box)
+    outputs = ("theta", "dtheta")[: len(bounds)]
+    return FeedbackStructure(name, outputs, -box, box, -past, past)
 
 
 def feed(
@@ -59,7 +97,7 @@ def feed(
     alone = FeedbackStructure("feed", AXIAL_OUTPUTS, -most, most, none, none, inputs=("axial",))
     if beside is None:
         return alone
-    other = preset_structure(beside) if isinstance(beside, str) else beside
+    other = as_structure(beside)
     return _side_by_side(other, alone)
 
 
@@ -85,4 +123,29 @@ def _side_by_side(one: FeedbackStructure, two: FeedbackStructure) -> FeedbackStr
         blocks("K2_lower"),
         blocks("K2_upper"),
         inputs=(*one.inputs, *two.inputs),
+    )
+
+
+def soft_torque(stiffness: float = 10.0, damping: float = 10.0) -> FeedbackStructure:
+    """Return PI speed control of a top drive: drive = −k φ − d φ' (soft torque).
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        Largest k and d, in units of Kt and of the root of Kt times the bit's inertia. Matched
+        impedance is d near 1; a stiff drive has both large.
+    """
+    most = [
+        checked_number("stiffness", stiffness, 0.0, 1e9, open_low=True),
+        checked_number("damping", damping, 0.0, 1e9, open_low=True),
+    ]
+    nothing = np.zeros((1, 2))
+    return FeedbackStructure(
+        "soft-torque",
+        ("phi", "dphi"),
+        -np.array([most]),
+        nothing,
+        nothing,
+        nothing,
+        inputs=("drive",),
     )

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.structure import FeedbackStructure, gain_matrices
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.delay.closing import gain_matrices
+from drillctrl.delay.structure import FeedbackStructure
 
 if TYPE_CHECKING:
     import control

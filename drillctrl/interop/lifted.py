@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_response
-from drillctrl.spectrum.characteristic import FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import magnitude_bound
 from drillctrl.spectrum.semidiscretization import semidiscretize
 
 if TYPE_CHECKING:

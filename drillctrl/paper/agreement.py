@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+
+from drillctrl.base.tableio import csv_text
 
 AGREES = "agrees"
 DIFFERS = "differs"
@@ -88,11 +88,7 @@ def as_markdown(rows: Sequence[Agreement]) -> str:
 
 def as_csv(rows: Sequence[Agreement]) -> str:
     """Return one line a statement."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(Agreement.__dataclass_fields__), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in rows)
-    return text.getvalue()
+    return csv_text(Agreement.__dataclass_fields__, (asdict(row).values() for row in rows))
 
 
 def as_json(rows: Sequence[Agreement]) -> str:

@@ -10,10 +10,11 @@ from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE
 from drillctrl.charts.discretised import gain_surface
 from drillctrl.charts.figure import draw_curves, label_axes
 from drillctrl.charts.stabilisable import stabilisable_chart
-from drillctrl.delay.structure import close_loop, preset_structure
-from drillctrl.delay.system import plant_system
+from drillctrl.delay.closing import close_loop
 from drillctrl.designs.design import design
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.structures import preset_structure
 from drillctrl.paper.agreement import DIFFERS, Agreement, compared, stated
 from drillctrl.paper.panels import Reproduced, panels
 from drillctrl.simulation.controller import Controller

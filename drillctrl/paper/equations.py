@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import scipy.optimize
 
-from drillctrl.delay.structure import close_loop, preset_structure
-from drillctrl.delay.system import plant_system
+from drillctrl.delay.closing import close_loop
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import table1
+from drillctrl.drilling.structures import preset_structure
 from drillctrl.paper.agreement import MISPRINT, Agreement
 from drillctrl.paper.controlled import AT_F, F
 from drillctrl.paper.panels import Reproduced

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import save_figure
 from drillctrl.base.files import write_text
+from drillctrl.base.tableio import csv_text
 from drillctrl.paper import controlled, uncontrolled
 from drillctrl.paper.agreement import Agreement, as_csv, as_json, as_markdown
 from drillctrl.paper.campaign import campaign
@@ -93,18 +92,11 @@ def reproduce(
         if made.figure is not None:
             save_figure(made.figure, folder / f"{name}.png")
         if made.table:
-            write_text(folder / f"{name}.csv", _rows_text(made.table))
+            rows_of_part = (row.values() for row in made.table)
+            write_text(folder / f"{name}.csv", csv_text(made.table[0], rows_of_part))
         rows += made.agreements
     for ending, text in ((".md", as_markdown), (".csv", as_csv), (".json", as_json)):
         write_text(folder / f"agreement{ending}", text(rows))
     if progress is not None:
         progress("done", len(parts), len(parts))
     return rows
-
-
-def _rows_text(table: Sequence[dict[str, object]]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(table)
-    return text.getvalue()

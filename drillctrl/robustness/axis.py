@@ -16,9 +16,9 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
 _MOST_PIECES = 200_000
 _MERGE = 1e-6

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import AxisMinimum, line_minimum, weighted_minimum
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import spectral_abscissa
 
 # Relative distances of the lower bound, over frequencies and over frequencies and delays.

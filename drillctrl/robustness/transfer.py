@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import FeedbackStructure, gain_matrices, loop_channels
+from drillctrl.delay.closing import gain_matrices, loop_channels
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    import control
+    pass
 
 _COARSEST = 0.02
 _MAX_POINTS = 20_000
@@ -109,43 +110,3 @@ def frequency_grid(
             break
         omega = np.insert(omega, coarse + 1, np.sqrt(omega[coarse] * omega[coarse + 1]))
     return omega
-
-
-def to_frd(
-    system: DelaySystem, omega: npt.ArrayLike | None = None
-) -> control.FrequencyResponseData:
-    """Return the exact frequency response as python-control data.
-
-    Bode, Nyquist, margins and feedback of python-control work on it without a Padé
-    approximation.
-
-    Parameters
-    ----------
-    system : DelaySystem
-        Any.
-    omega : array_like, optional
-        By default `frequency_grid`.
-    """
-    import control
-
-    grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
-    return control.frd(frequency_response(system, grid), grid, smooth=_is_siso(system))
-
-
-def loop_frd(
-    system: DelaySystem,
-    structure: FeedbackStructure,
-    K1: npt.ArrayLike,
-    K2: npt.ArrayLike | None = None,
-    omega: npt.ArrayLike | None = None,
-) -> control.FrequencyResponseData:
-    """Return `loop_transfer` as python-control data, ready for ``stability_margins``."""
-    import control
-
-    grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
-    data = loop_transfer(system, structure, K1, K2, grid)
-    return control.frd(data, grid, smooth=data.shape[0] == 1)
-
-
-def _is_siso(system: DelaySystem) -> bool:
-    return bool(system.B.shape[1] == 1 and system.C.shape[0] == 1)

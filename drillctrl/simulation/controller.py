@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.delay.structure import FeedbackStructure, gain_matrices, preset_structure
-from drillctrl.drilling.plant import INPUT_NAMES, STATE_NAMES
+from drillctrl.delay.closing import gain_matrices
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.coefficients import INPUT_NAMES, STATE_NAMES
+from drillctrl.drilling.structures import preset_structure
 
-FloatArray = npt.NDArray[np.float64]
 DELAYS = ("fixed", "current")
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import replacing
+from drillctrl.base.tableio import csv_text
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.rig_units import SI_UNITS
 
@@ -66,9 +65,6 @@ def export_motion(simulation: Simulation, path: str | Path) -> None:
 
             pyarrow.parquet.write_table(pyarrow.table(columns), file)
         else:
-            text = io.StringIO()
-            text.write(f"# drillctrl simulation, {units}; {simulation.point!r}\n")
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
-            file.write(text.getvalue().encode("utf-8"))
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            told = f"drillctrl simulation, {units}; {simulation.point!r}"
+            file.write(csv_text(columns, rows, [told]).encode("utf-8"))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
-from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.rock_face import rock_face
+from drillctrl.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,21 +39,21 @@ _PER_STEP = 5
 _TIME = "dimensionless time t"
 
 
-def plot_motion(run: Simulation) -> Figure:
+def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
     """Draw axial motion, bit speed and control over time; see `plot_signal`.
 
     Parameters
     ----------
-    run : Simulation
+    run : Trace
         Of `simulate`.
+    inputs : sequence of str
+        Those that a controller drives.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     names = ["x", "bit_speed"]
-    if run.controller is not None:
-        inputs = run.controller.feedback.inputs  # type: ignore[union-attr]
-        names += [name for name in ("axial", "torque") if name in inputs]
+    names += [name for name in ("axial", "torque") if name in inputs]
     figure = Figure(figsize=(7.2, 1.9 * len(names) + 0.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(names), 1, sharex=True)
@@ -66,12 +68,12 @@ def plot_motion(run: Simulation) -> Figure:
     return figure
 
 
-def plot_signal(run: Simulation, name: str = "x", ax: Axes | None = None) -> Axes:
+def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
     """Draw one signal over time, with what the bit and the controller are stopped by shaded.
 
     Parameters
     ----------
-    run : Simulation
+    run : Trace
         Of `simulate`.
     name : str
         A key of `SIGNALS`.
@@ -93,13 +95,13 @@ def plot_signal(run: Simulation, name: str = "x", ax: Axes | None = None) -> Axe
 
 
 def plot_phase_portrait(
-    run: Simulation, plane: str = "torsion", ax: Axes | None = None, since: float = 0.0
+    run: Trace, plane: str = "torsion", ax: Axes | None = None, since: float = 0.0
 ) -> Axes:
     """Draw the motion in a plane of states, with what was before ``since`` thin and grey.
 
     Parameters
     ----------
-    run : Simulation
+    run : Trace
         Of `simulate`.
     plane : {"torsion", "axial"}
         θ' over θ, or x' over x.
@@ -138,13 +140,13 @@ def plot_phase_portrait(
 
 
 def plot_against_linear(
-    nonlinear: Simulation, linear: Simulation, name: str = "x", ax: Axes | None = None
+    nonlinear: Trace, linear: Trace, name: str = "x", ax: Axes | None = None
 ) -> Axes:
     """Draw a signal of the nonlinear motion over that of the linear one.
 
     Parameters
     ----------
-    nonlinear, linear : Simulation
+    nonlinear, linear : Trace
         Of the same point, controller and disturbance. The linear motion is cut where it
         grows beyond three times the range of the other.
     name : str
@@ -169,12 +171,12 @@ def plot_against_linear(
     return ax
 
 
-def plot_rock_face(run: Simulation, time: float | None = None, ax: Axes | None = None) -> Axes:
+def plot_rock_face(run: Trace, time: float | None = None, ax: Axes | None = None) -> Axes:
     """Draw the rock that lies ahead of a blade over the next blade pitch.
 
     Parameters
     ----------
-    run : Simulation
+    run : Trace
         Of the nonlinear model.
     time : float, optional
         The instant; by default the end of the run.
@@ -183,7 +185,7 @@ def plot_rock_face(run: Simulation, time: float | None = None, ax: Axes | None =
     """
     ax = new_axes(6.4, 3.2) if ax is None else ax
     when = float(run.times[-1]) if time is None else time
-    face = run.rock_face(when, 361)
+    face = rock_face(run, when, 361)
     degrees = np.degrees(face.angle)
     bottom = min(float(face.height.min()), 0.0) - 0.2 * max(float(np.ptp(face.height)), 1e-9)
     ax.fill_between(degrees, bottom, face.height, color=GREY, alpha=0.35, linewidth=0)
@@ -204,7 +206,7 @@ def plot_rock_face(run: Simulation, time: float | None = None, ax: Axes | None =
     return ax
 
 
-def _signal(run: Simulation, name: str) -> tuple[Any, Any]:
+def _signal(run: Trace, name: str) -> tuple[Any, Any]:
     if name not in SIGNALS:
         raise InputError("signal", name, f"one of {', '.join(SIGNALS)}")
     motion = run.on_steps(_PER_STEP)
@@ -213,10 +215,10 @@ def _signal(run: Simulation, name: str) -> tuple[Any, Any]:
     return getattr(motion, name), motion.times
 
 
-def _title(run: Simulation) -> str:
+def _title(run: Trace) -> str:
     return f"{run.model.capitalize()} motion at {_place(run)}"
 
 
-def _place(run: Simulation) -> str:
+def _place(run: Trace) -> str:
     p = run.point
     return f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"

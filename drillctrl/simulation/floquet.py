@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
@@ -20,8 +21,6 @@ from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 # Nodes of a panel: as many as a quintic has coefficients.
 _NODES = 6
 _PANELS_PER_DELAY = 4.0
@@ -247,7 +246,7 @@ def _reach(run: Simulation, section: float, data: Any) -> float:
     earliest = section - lag
     if run.model == "linear":
         return earliest
-    start, face = run._history["real"][:, data.START], run._history["whole"][:, data.FACE]
+    start, face = run.history["real"][:, data.START], run.history["whole"][:, data.FACE]
     # The faces under the blades between here and one pitch back, and what feedback sees there.
     back = section - float(run.at([section]).delay[0])
     rows = np.flatnonzero((start >= back - run.point.delay) & (start <= section))
@@ -309,7 +308,7 @@ def _window(run: Simulation, section: float) -> _Window:
 def _perturbation(after: Simulation, window: _Window, time: float) -> FloatArray:
     """Return the signals on the window ending at an instant, scaled so that the norm is L2."""
     data = kernel("data")
-    real = after._history["real"]
+    real = after.history["real"]
     times = time + window.times
     j = np.clip(np.searchsorted(real[:, data.START], times, side="right") - 1, 1, None)
     s = (times - real[j, data.START]) / real[j, data.LENGTH]

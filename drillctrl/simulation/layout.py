@@ -7,21 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.plant import (
-    branch_functions,
-    dimensionless_plant,
-    linear_depth,
-    linearisation,
-    parameter_vector,
-)
+from drillctrl.drilling.linear import linear_depth, linearisation, parameter_vector
+from drillctrl.drilling.plant import branch_functions, dimensionless_plant
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.past import Past
 from drillctrl.simulation.scenario import Scenario
 
-FloatArray = npt.NDArray[np.float64]
 FIRST_ROOM = 4096
 MAX_SAMPLES = 10_000_000
 

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.plant import STATE_NAMES
+from drillctrl.drilling.coefficients import STATE_NAMES
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.summary import section_crossings
 
-FloatArray = npt.NDArray[np.float64]
 # Returns nearer than this many tolerances say nothing of the motion.
 _NOISE = 300.0
 _FAR = 1e-2

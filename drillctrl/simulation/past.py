@@ -9,14 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 
 if TYPE_CHECKING:
-    from drillctrl.simulation.result import Simulation
-
-FloatArray = npt.NDArray[np.float64]
+    from drillctrl.simulation.trace import Trace
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +48,17 @@ class Past:
         return f"<Past: {-begun:g} units of time, {len(self.real) - 1} steps>"
 
 
-def past_of(run: Simulation, time: float | None = None) -> Past:
+def past_of(run: Trace, time: float | None = None, changed: float | None = None) -> Past:
     """Return what a run has left behind.
 
     Parameters
     ----------
-    run : Simulation
-        Without changes of the drive or the rock before that instant.
+    run : Trace
+        What was integrated.
     time : float, optional
         The instant; by default the end of the run.
+    changed : float, optional
+        When the drive or the rock was first changed, which must not be before the instant.
 
     Raises
     ------
@@ -66,14 +67,13 @@ def past_of(run: Simulation, time: float | None = None) -> Past:
     """
     end = float(run.times[-1])
     when = end if time is None else checked_number("time", time, 0.0, end)
-    changes = run.scenario.changes
-    if changes and changes[0].time < when:
-        raise InputError("time", when, f"at most {changes[0].time:g}, where the rig is changed")
+    if changed is not None and changed < when:
+        raise InputError("time", when, f"at most {changed:g}, where the rig is changed")
     data = kernel("data")
-    history: dict[str, Any] = dict(run._history)
+    history: dict[str, Any] = dict(run.history)
     start = history["real"][:, data.START]
     last = int(np.searchsorted(start, when, side="left"))
-    first = run._first
+    first = run.first
     last = max(last, first)
     real, whole = history["real"][:last].copy(), history["whole"][:last].copy()
     if last > first:

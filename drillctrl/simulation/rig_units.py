@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.drilling.rig import Rig
 
 if TYPE_CHECKING:
     from drillctrl.drilling.point import OperatingPoint
-    from drillctrl.simulation.result import Motion
+    from drillctrl.simulation.trace import Motion
 
-FloatArray = npt.NDArray[np.float64]
 # SI units of the columns; what is not here is a yes or no.
 SI_UNITS = {
     "times": "s",

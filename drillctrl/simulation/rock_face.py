@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.trace import Trace
 
-if TYPE_CHECKING:
-    from drillctrl.simulation.result import Simulation
-
-FloatArray = npt.NDArray[np.float64]
 _MOST_PASSES = 64
 
 
@@ -38,12 +35,12 @@ class RockFace:
     passes: npt.NDArray[np.int64]
 
 
-def rock_face(run: Simulation, time: float, count: int = 181) -> RockFace:
+def rock_face(run: Trace, time: float, count: int = 181) -> RockFace:
     """Return the rock face ahead of a blade.
 
     Parameters
     ----------
-    run : Simulation
+    run : Trace
         Of the nonlinear model.
     time : float
         The instant.
@@ -88,15 +85,13 @@ def rock_face(run: Simulation, time: float, count: int = 181) -> RockFace:
     return RockFace(angle, low - face, passes)
 
 
-def _face(
-    run: Simulation, angles: FloatArray, until: float
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def _face(run: Trace, angles: FloatArray, until: float) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """Return how deep the bit was when it stood at some angles, and whether it was in the rock.
 
     Steps before t = 0 count as well; the first of all is uniform motion without end.
     """
     data = kernel("data")
-    real, whole = run._history["real"], run._history["whole"]
+    real, whole = run.history["real"], run.history["whole"]
     rows = int(np.searchsorted(real[:, data.START], until, side="right"))
     real, spin = real[:rows], run.point.omega0
 

@@ -184,8 +184,8 @@ def simulate(
         rejected=int(standing.ints[march.REJECTED]),
         evaluations=int(standing.ints[march.EVALUATIONS]),
         elapsed_seconds=elapsed,
-        _settings=settings._asdict(),
-        _history=history._asdict(),
-        _first=standing.first,
+        settings=settings._asdict(),
+        history=history._asdict(),
+        first=standing.first,
         rig=rig,
     )

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.plant import STATE_NAMES
+from drillctrl.drilling.coefficients import STATE_NAMES
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.past import Past
 
-FloatArray = npt.NDArray[np.float64]
 STARTS = ("steady", "rest")
 
 

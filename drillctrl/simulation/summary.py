@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from drillctrl.simulation.result import Motion, Simulation
+from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.trace import Motion, Trace
 
-FloatArray = npt.NDArray[np.float64]
 SETTLED = 1e-3
 SETTLED_WITHIN = 0.02
 RETURNED = 1e-3
@@ -72,7 +70,7 @@ class Summary:
         return asdict(self)
 
 
-def summarise(simulation: Simulation) -> Summary:
+def summarise(simulation: Trace) -> Summary:
     """Return the figures of a run."""
     end = float(simulation.times[-1])
     since = 0.75 * end
@@ -106,12 +104,12 @@ def summarise(simulation: Simulation) -> Summary:
     )
 
 
-def settling_time(simulation: Simulation, within: float = SETTLED_WITHIN) -> float | None:
+def settling_time(simulation: Trace, within: float = SETTLED_WITHIN) -> float | None:
     """Return when |x| and |θ| stay below a share of their largest values.
 
     Parameters
     ----------
-    simulation : Simulation
+    simulation : Trace
         A finished run.
     within : float
         The share.
@@ -132,7 +130,7 @@ def settling_time(simulation: Simulation, within: float = SETTLED_WITHIN) -> flo
     return None if last > 0.9 * simulation.duration else last
 
 
-def _share(simulation: Simulation, phase: str, since: float, end: float) -> float:
+def _share(simulation: Trace, phase: str, since: float, end: float) -> float:
     """Share of [since, end] spent in a phase."""
     if end <= since:
         return 0.0
@@ -140,7 +138,7 @@ def _share(simulation: Simulation, phase: str, since: float, end: float) -> floa
     return spent / (end - since)
 
 
-def _extreme(simulation: Simulation, tail: Motion, name: str, *, least: bool = False) -> float:
+def _extreme(simulation: Trace, tail: Motion, name: str, *, least: bool = False) -> float:
     """Extreme of a quantity, looked for again between the samples around the extreme one."""
     sign = -1.0 if least else 1.0
     values = sign * getattr(tail, name)
@@ -153,7 +151,7 @@ def _extreme(simulation: Simulation, tail: Motion, name: str, *, least: bool = F
     return sign * best
 
 
-def section_crossings(simulation: Simulation, since: float) -> FloatArray:
+def section_crossings(simulation: Trace, since: float) -> FloatArray:
     """Return the times at which θ rises through the middle of its range, by bisection."""
     tail = simulation.on_steps(PER_STEP, since)
     middle = 0.5 * (tail.theta.max() + tail.theta.min())
@@ -169,7 +167,7 @@ def section_crossings(simulation: Simulation, since: float) -> FloatArray:
     return 0.5 * (low + high)
 
 
-def period(simulation: Simulation, since: float) -> float | None:
+def period(simulation: Trace, since: float) -> float | None:
     """Return the time after which the motion since some instant repeats, or None.
 
     The states at the crossings of a section are compared with those so many crossings later.

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import FeedbackStructure, loop_channels
-from drillctrl.delay.system import DelaySystem, plant_system
-from drillctrl.drilling.plant import (
-    INPUT_NAMES,
-    PARAMETER_NAMES,
-    dimensionless_plant,
-    linearisation,
-    parameter_vector,
-)
-from drillctrl.drilling.point import OperatingPoint
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.pseudospectral import _blocks, degree_for_reach
 from drillctrl.spectrum.roots import EPSILON, spectral_abscissa
 
@@ -164,92 +154,3 @@ def _log_derivative(
         beside = s + 1e-15 * (1.0 + np.abs(s))
         return _log_derivative(A0, delayed, delay, beside)
     return np.asarray(np.einsum("qkij,qkji->qk", inverse, slope))
-
-
-def spectral_abscissas(
-    point: OperatingPoint,
-    parameters: Mapping[str, npt.ArrayLike] | None = None,
-    structure: FeedbackStructure | None = None,
-    gains: npt.ArrayLike | None = None,
-    workers: int | None = None,
-) -> FloatArray:
-    """Return α for many operating points, many gains, or both side by side.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-        Supplies the parameters that do not vary.
-    parameters : mapping of str to array_like, (q,), optional
-        Values of the parameters that vary, by name.
-    structure : FeedbackStructure, optional
-        Without it the open loop.
-    gains : array_like, (q, k) or (k,), optional
-        Gain vectors of the structure.
-    workers : int, optional
-        Threads; by default one for each core.
-
-    Returns
-    -------
-    array, (q,)
-        Spectral abscissas.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, lengths differ or a value is out of range.
-    """
-    varied = {name: np.atleast_1d(np.asarray(v, float)) for name, v in (parameters or {}).items()}
-    vectors = None
-    if structure is not None:
-        vectors = np.atleast_2d(np.asarray(gains, dtype=float))
-        if vectors.shape[1] != structure.lower.size or not np.isfinite(vectors).all():
-            raise InputError(
-                "gains",
-                f"array of shape {vectors.shape}",
-                f"finite, with {structure.lower.size} columns",
-            )
-    lengths = {v.size for v in varied.values()} | (set() if vectors is None else {len(vectors)})
-    count = max(lengths, default=1)
-    if not lengths <= {1, count}:
-        raise InputError("parameters", sorted(lengths), "arrays of one length")
-    table = np.tile(parameter_vector(point)[:, None], (1, count))
-    for name, values in varied.items():
-        if name not in PARAMETER_NAMES:
-            raise InputError("parameters", name, f"one of {', '.join(PARAMETER_NAMES)}")
-        # The two ends of the range decide whether all of it is permitted.
-        for value in (values.min(), values.max()):
-            point.with_changes(**{name: float(value)})
-        table[PARAMETER_NAMES.index(name)] = values
-    a0, left, right, delay = _plant_arrays(table)
-    if structure is not None and vectors is not None:
-        nominal = plant_system(point, INPUT_NAMES)
-        drive, measure = loop_channels(nominal, structure)
-        now, past = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
-        a0 = a0 + drive @ now @ measure
-        if past.any():
-            left = np.concatenate([left, np.broadcast_to(drive, (count, *drive.shape))], axis=2)
-            right = np.concatenate([right, past @ measure], axis=1)
-    return batch_abscissas(a0, left, right, delay, workers)
-
-
-def _plant_arrays(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return A0, the factors of A1 and τ0 for every column of parameters."""
-    count = table.shape[1]
-    mapped = linearisation(dimensionless_plant()).map(count)
-    a1, a2, _, tau = (value.full() for value in mapped(table))
-    a1 = a1.reshape(4, count, 4).transpose(1, 0, 2)
-    a2 = a2.reshape(4, count, 4).transpose(1, 0, 2)
-    # The plant delays one signal: every row of A2 is a multiple of its last.
-    right = a2[:, 3:, :]
-    left = a2 @ right.transpose(0, 2, 1) / (right**2).sum(axis=2, keepdims=True)
-    return a1, left, right, tau.ravel()
-
-
-def _gain_arrays(
-    structure: FeedbackStructure, vectors: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return K1 and K2 for every gain vector, each (q, m, p)."""
-    flat = structure.fixed + vectors @ structure.spread.T
-    half = flat.shape[1] // 2
-    shape = (len(vectors), *structure.K1_lower.shape)
-    return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)

@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import dgeev
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
-
-ComplexArray = npt.NDArray[np.complex128]
-FloatArray = npt.NDArray[np.float64]
 
 # Beyond this, exp(−s τ) would overflow when squared; such an s lies far left of any line
 # that matters.

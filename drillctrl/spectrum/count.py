@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import magnitude_bound
 
 _LARGEST_STEP = 1.2
 _LARGEST_SURPRISE = 0.5

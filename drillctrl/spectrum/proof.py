@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.characteristic import FloatArray
 
 PRECISION = 106
 _TERMS = 6

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg.lapack import dgeev
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import magnitude_bound
 
 MAX_DEGREE = 400
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 
 # Radius of the circle for s: the roots that matter have modulus 0.5 to 10.
 _RADIUS = 2.0

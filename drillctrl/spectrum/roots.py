@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,

@@ -16,9 +16,10 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.delay.system import DelaySystem, low_rank_factors
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import magnitude_bound
 
 MAX_INTERVALS = 4000
 _DEFAULT_LIMIT = 400

@@ -2,44 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
-from drillctrl.delay.system import DelaySystem, plant_system
-from drillctrl.drilling.plant import (
-    PARAMETER_NAMES,
-    Plant,
-    dimensionless_plant,
-    linearisation_sensitivity,
-    parameter_vector,
-)
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
-from drillctrl.spectrum.roots import Root, dominant_roots
-
-
-@dataclass(frozen=True, eq=False)
-class RootSensitivity:
-    """Derivatives of one simple root; the real parts are those of α if it is dominant.
-
-    Attributes
-    ----------
-    root : Root
-        The root.
-    K1, K2 : complex array, (m, p)
-        Derivatives with respect to the gains; empty for an open loop.
-    parameters : dict
-        Complex derivatives with respect to ω0, δ0, ψ, η, ξ, κ and n, by name.
-    """
-
-    root: Root
-    K1: ComplexArray
-    K2: ComplexArray
-    parameters: dict[str, complex]
 
 
 def matrix_sensitivity(
@@ -73,58 +40,3 @@ def matrix_sensitivity(
         for factor, matrix in zip(factors, system.delayed, strict=True)
     )
     return outer, slopes, delays
-
-
-def root_sensitivity(
-    point: OperatingPoint,
-    structure: FeedbackStructure | None = None,
-    K1: FloatArray | None = None,
-    K2: FloatArray | None = None,
-    *,
-    index: int = 0,
-    plant: Plant | None = None,
-) -> RootSensitivity:
-    """Differentiate a dominant root with respect to gains and operating point.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-        Where the rig drills.
-    structure, K1, K2 : optional
-        Feedback; without it the open loop.
-    index : int
-        Which of the `dominant_roots` of the loop; 0 is the one whose real part is α.
-    plant : Plant, optional
-        With the same parameters as `dimensionless_plant`, which is the default.
-
-    Raises
-    ------
-    InputError
-        If the root is multiple: it has no derivative there.
-    """
-    plant = dimensionless_plant() if plant is None else plant
-    inputs = structure.inputs if structure else ("torque",)
-    open_loop = plant_system(point, inputs, plant)
-    loop = open_loop
-    if structure is not None:
-        loop = close_loop(open_loop, structure, np.asarray(K1), K2)
-    roots = dominant_roots(loop)
-    if not 0 <= index < len(roots):
-        raise InputError("index", index, f"in [0, {len(roots) - 1}]")
-    root = roots[index]
-    if root.multiplicity > 1:
-        raise InputError("index", index, f"a simple root, this is {root.multiplicity}-fold")
-    d_a0, d_delayed, d_tau = matrix_sensitivity(loop, root.value)
-    at = loop.delays.index(open_loop.max_delay)
-    gains = [np.zeros((0, 0), dtype=complex)] * 2
-    if structure is not None:
-        drive, measure = loop_channels(open_loop, structure)
-        gains = [drive.T @ d @ measure.T for d in (d_a0, d_delayed[at])]
-    # The CasADi Jacobian stacks A1, A2, B column by column, then τ0.
-    jacobian = linearisation_sensitivity(plant)(parameter_vector(point)).full()
-    size = open_loop.order**2
-    weights = np.concatenate([d_a0.ravel(order="F"), d_delayed[at].ravel(order="F")])
-    slopes = weights @ jacobian[: 2 * size] + d_tau[at] * jacobian[-1]
-    names = [name for name in PARAMETER_NAMES if name not in ("lam", "beta")]
-    by_name = {name: complex(slopes[PARAMETER_NAMES.index(name)]) for name in names}
-    return RootSensitivity(root, gains[0], gains[1], by_name)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.spectrum.semidiscretization import (
     MAX_INTERVALS,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -12,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.files import write_text
+from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.drilling.plant import STATE_NAMES
+from drillctrl.drilling.coefficients import STATE_NAMES
 from drillctrl.simulation.controller import Controller
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.grid import Grid
@@ -24,7 +28,6 @@ from drillctrl.tables.table import GainTable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FloatArray = npt.NDArray[np.float64]
 DISTURBANCE = {"dx": 1.0, "dtheta": 1.0}
 
 
@@ -155,7 +158,14 @@ class Campaign:
         """Draw outcomes and the basin over the grid; see `plot_campaign`."""
         from drillctrl.studies.campaign_figure import plot_campaign
 
-        return plot_campaign(self)
+        return plot_campaign(
+            self.grid,
+            self.sizes,
+            self.outcomes,
+            self.spectral_abscissa,
+            self.basin,
+            self.disturbance,
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the rows as CSV or all of it as JSON, whole or not at all.
@@ -165,9 +175,16 @@ class Campaign:
         InputError
             If the name does not end in .csv or .json.
         """
-        from drillctrl.studies.campaign_files import save_campaign
-
-        save_campaign(self, path)
+        ending = Path(path).suffix.lower()
+        if ending == ".json":
+            text = json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
+        elif ending == ".csv":
+            kick = ", ".join(f"{name} {value!r}" for name, value in self.disturbance.items())
+            told = f"drillctrl campaign, dimensionless; disturbance of size 1: {kick}"
+            text = csv_text(self.columns, self.rows(), [told])
+        else:
+            raise InputError("path", str(path), "a name that ends in .csv or .json")
+        write_text(path, text)
 
     def __repr__(self) -> str:
         size = " × ".join(str(n) for n in self.grid.shape)

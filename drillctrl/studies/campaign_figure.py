@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE
 from drillctrl.tables.figure import axis_label
+from drillctrl.tables.grid import Grid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from drillctrl.studies.campaign import Campaign
 
 _MARKS = {
     "settled": ("o", BLUE),
@@ -25,16 +28,23 @@ _MARKS = {
 }
 
 
-def plot_campaign(campaign: Campaign) -> Figure:
+def plot_campaign(
+    grid: Grid,
+    sizes: Sequence[float],
+    outcomes: npt.NDArray[np.str_],
+    spectral_abscissa: FloatArray,
+    basin: FloatArray,
+    disturbance: Mapping[str, float],
+) -> Figure:
     """Draw the outcome of each size and the edge of the basin over the two longest axes.
 
-    Of a third axis the middle value is shown. The line is α = 0 of the linear loop.
+    Of a third axis the middle value is shown. The line is α = 0 of the linear loop. Parameters
+    are the attributes of a `Campaign`.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-    grid = campaign.grid
     across = 2 - int(np.argmin(grid.shape[::-1]))
     right, up = (axis for axis in range(3) if axis != across)
     middle = grid.shape[across] // 2
@@ -44,15 +54,15 @@ def plot_campaign(campaign: Campaign) -> Figure:
     )
     at_x, at_y = (values.ravel() for values in np.meshgrid(x, y, indexing="ij"))
     flat = chosen.ravel()
-    measured = bool((np.nan_to_num(campaign.basin[flat, 0]) > 0.0).any())
-    count = len(campaign.sizes) + measured
+    measured = bool((np.nan_to_num(basin[flat, 0]) > 0.0).any())
+    count = len(sizes) + measured
     figure = Figure(figsize=(4.3 * count, 4.3), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, count, squeeze=False, sharex=True, sharey=True)[0]
-    alpha = campaign.spectral_abscissa[chosen]
-    for k, size in enumerate(campaign.sizes):
+    alpha = spectral_abscissa[chosen]
+    for k, size in enumerate(sizes):
         for name, (marker, colour) in _MARKS.items():
-            there = campaign.outcomes[flat, k] == name
+            there = outcomes[flat, k] == name
             if there.any():
                 axes[k].plot(
                     at_x[there], at_y[there], marker, color=colour, linestyle="none", label=name,
@@ -67,7 +77,7 @@ def plot_campaign(campaign: Campaign) -> Figure:
             frameon=False,
         )
     if measured:
-        low = campaign.basin[chosen, 0]
+        low = basin[chosen, 0]
         shown = np.ma.masked_invalid(np.where(low > 0.0, low, np.nan))
         norm = LogNorm(min(float(shown.min()), 0.1 * float(shown.max())), float(shown.max()))
         picture = axes[-1].pcolormesh(x, y, shown.T, shading="nearest", cmap="viridis", norm=norm)
@@ -78,6 +88,6 @@ def plot_campaign(campaign: Campaign) -> Figure:
             ax.contour(x, y, alpha.T, levels=[0.0], colors="black", linewidths=1.0)
         ax.set_xlabel(axis_label(grid.axes[right]))
         ax.set_ylabel(axis_label(grid.axes[up]))
-    kick = ", ".join(f"{name} = {value:g}" for name, value in campaign.disturbance.items())
+    kick = ", ".join(f"{name} = {value:g}" for name, value in disturbance.items())
     figure.suptitle(f"After {kick} times the size; the line is α = 0", fontsize="medium")
     return figure

@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.structure import FeedbackStructure, preset_structure
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.result import Design
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.studies.measures import LoopMargins, Response, basin, loop_margins, respond
+from drillctrl.drilling.structures import as_structure
+from drillctrl.robustness.loop_margins import LoopMargins, loop_margins
+from drillctrl.studies.comparison import OPEN_LOOP, SORTS, Comparison, Row
+from drillctrl.studies.comparison_text import delay_room
+from drillctrl.studies.measures import basin, respond
 
 if TYPE_CHECKING:
     from drillctrl.charts.chart import StabilityChart
@@ -23,132 +26,8 @@ if TYPE_CHECKING:
 Given = tuple[str, str | FeedbackStructure, npt.ArrayLike, npt.ArrayLike | None]
 Progress = Callable[[str, int, int], None]
 
-OPEN_LOOP = "none"
 DISTURBANCE = {"dx": 1.0, "dtheta": 1.0}
 REGION = (("omega0", 0.5, 25.0), ("delta0", 0.0, 15.0))
-# Whether a larger value is the better one.
-SORTS = {
-    "spectral_abscissa": False,
-    "stability_radius": True,
-    "delay_margin": True,
-    "phase_margin": True,
-    "peak_sensitivity": False,
-    "max_abs_u": False,
-    "max_abs_x": False,
-    "settling_time": False,
-    "basin": True,
-    "stable_area": True,
-    "formation_change": True,
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """One candidate and its measures; None stands for what does not exist.
-
-    Attributes
-    ----------
-    label : str
-        Its name in the table.
-    design : Design
-        Its gains and linear analysis.
-    designed : bool
-        Whether the gains were designed here.
-    margins : LoopMargins or None
-        Of a stable loop with one input.
-    linear, nonlinear : Response or None
-        After the disturbance.
-    basin : float or None
-        Multiple of the disturbance that still settles; see `measures.basin`.
-    chart : StabilityChart or None
-        Where the same gains are stable.
-    area_ratio : float or None
-        Stable area over that of the open loop.
-    """
-
-    label: str
-    design: Design
-    designed: bool
-    margins: LoopMargins | None
-    linear: Response | None
-    nonlinear: Response | None
-    basin: float | None
-    chart: StabilityChart | None
-    area_ratio: float | None
-
-    @property
-    def formation_change(self) -> float | None:
-        """Smallest relative change of ψ, up or down, that destabilises; linear."""
-        margins = self.design.point_margins
-        return None if margins is None else min(margins["psi"].upper, -margins["psi"].lower)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON fields of a row."""
-        from drillctrl.studies.comparison_export import row_fields
-
-        return row_fields(self)
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Candidates side by side.
-
-    Attributes
-    ----------
-    point : OperatingPoint or RigPoint
-        Where they were compared.
-    rows : tuple of Row
-        Best first by ``sort``; those without the measure last.
-    sort : str
-        One of `SORTS`.
-    disturbance : mapping
-        What the responses follow: a perturbation of steady drilling at t = 0.
-    duration : float
-        Length of the simulations.
-    elapsed_seconds : float
-        Wall time.
-    """
-
-    point: OperatingPoint | RigPoint
-    rows: tuple[Row, ...]
-    sort: str
-    disturbance: Mapping[str, float]
-    duration: float
-    elapsed_seconds: float
-
-    def summary(self) -> str:
-        """Return the table and what better costs, for people."""
-        from drillctrl.studies.comparison_text import comparison_text
-
-        return comparison_text(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON fields of the command line."""
-        from drillctrl.studies.comparison_export import comparison_fields
-
-        return comparison_fields(self)
-
-    def to_csv(self) -> str:
-        """Return one line a candidate."""
-        from drillctrl.studies.comparison_export import comparison_csv
-
-        return comparison_csv(self)
-
-    def to_html(self) -> str:
-        """Return one page with the table and the figures in it.
-
-        Raises
-        ------
-        InputError
-            If jinja2 is not installed.
-        """
-        from drillctrl.studies.compare_page import comparison_html
-
-        return comparison_html(self)
-
-    def __repr__(self) -> str:
-        names = ", ".join(row.label for row in self.rows)
-        return f"<Comparison of {names}, by {self.sort}>"
 
 
 def _subjects(
@@ -160,7 +39,7 @@ def _subjects(
 ) -> list[tuple[str, Design, bool]]:
     """Design and analyse the candidates, the open loop first."""
     subjects = [(OPEN_LOOP, analyze(point), False)]
-    designed = [preset_structure(s) if isinstance(s, str) else s for s in structures]
+    designed = [as_structure(s) for s in structures]
     known = dict.fromkeys(name for chosen in designed for name in chosen.entry_names)
     for name in bounds or {}:
         if name not in ("K1", "K2", *known):
@@ -255,7 +134,7 @@ def compare(
                 label,
                 subject,
                 designed,
-                loop_margins(subject),
+                _margins(subject),
                 respond(subject, pushed, duration, "linear"),
                 respond(subject, pushed, duration, "nonlinear"),
                 basin(subject, pushed, duration),
@@ -268,6 +147,14 @@ def compare(
     rows.sort(key=lambda row: _rank(row, sort))
     elapsed = time.perf_counter() - began
     return Comparison(point, tuple(rows), sort, pushed, duration, elapsed)
+
+
+def _margins(subject: Design) -> LoopMargins | None:
+    """Return the margins of a stable loop with one input."""
+    structure = subject.structure
+    if structure is None or not subject.stable or len(structure.inputs) != 1:
+        return None
+    return loop_margins(subject.plant, structure, subject.K1, subject.K2)
 
 
 def _chart(
@@ -287,8 +174,6 @@ def _chart(
 def _rank(row: Row, sort: str) -> float:
     value: Any = row.to_dict()[sort]
     if isinstance(value, dict):
-        from drillctrl.studies.comparison_text import delay_room
-
         value = delay_room(value)
     if value is None:
         return math.inf

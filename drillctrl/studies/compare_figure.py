@@ -1,59 +1,68 @@
-"""Figures of a comparison. Each takes matplotlib Axes, or makes them, and returns them."""
+"""Figures of a comparison. Each takes values by label and matplotlib Axes, or makes these."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
-from drillctrl.charts.figure import STYLES, plot_charts
-from drillctrl.robustness.transfer import frequency_grid, loop_transfer
+from drillctrl.charts.figure import STYLES, Charted, plot_charts
+from drillctrl.studies.measures import Response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from drillctrl.studies.compare import Comparison, Row
 
 # The same order as in the charts.
 PALETTE = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
 MARKERS = "osD^v<"
-_SHOWN = 6
+SHOWN = 6
+
+Looks = Mapping[str, tuple[str, str]]
 
 
-def _candidates(comparison: Comparison) -> list[tuple[Row, str, str]]:
-    """Return the first candidates with feedback, each with a colour and a line style."""
-    rows = [row for row in comparison.rows if row.design.structure is not None][:_SHOWN]
-    return [(row, PALETTE[i % len(PALETTE)], STYLES[i % len(STYLES)]) for i, row in enumerate(rows)]
+def looks(labels: Sequence[str]) -> Looks:
+    """Return a colour and a line style for each of the first candidates."""
+    return {
+        label: (PALETTE[i % len(PALETTE)], STYLES[i % len(STYLES)])
+        for i, label in enumerate(labels[:SHOWN])
+    }
 
 
 def plot_responses(
-    comparison: Comparison, name: str = "x", ax: Axes | None = None, model: str = "nonlinear"
+    responses: Mapping[str, Response],
+    looks: Looks,
+    name: str = "x",
+    ax: Axes | None = None,
+    model: str = "nonlinear",
 ) -> Axes:
-    """Draw the motion of each stable candidate after the disturbance.
+    """Draw the motion of stable candidates after the disturbance.
 
     Parameters
     ----------
-    comparison : Comparison
-        Of `compare`.
+    responses : mapping of str to Response
+        By label.
+    looks : mapping
+        Of `looks`.
     name : str
         ``"x"``, ``"theta"``, or ``"torque"`` for the control.
     ax : Axes, optional
         By default new ones.
     model : {"nonlinear", "linear"}
-        Which motion.
+        Which motion it is.
     """
     ax = new_axes() if ax is None else ax
     longest = 10.0
-    for row, colour, style in _candidates(comparison):
-        response = row.nonlinear if model == "nonlinear" else row.linear
-        if response is None or not row.design.stable:
-            continue
+    for label, response in responses.items():
+        colour, style = looks[label]
         run = response.run
         longest = max(longest, response.settling_time or 0.25 * run.duration)
         motion = run.on_steps(5)
         values = getattr(motion, name)
-        ax.plot(motion.times, values, style, color=colour, linewidth=1.1, label=row.label)
+        ax.plot(motion.times, values, style, color=colour, linewidth=1.1, label=label)
     ax.set_xlim(0.0, 1.2 * longest)
     ax.set_xlabel("dimensionless time t")
     ax.set_ylabel({"theta": "θ", "torque": "control u"}.get(name, name))
@@ -64,16 +73,22 @@ def plot_responses(
     return ax
 
 
-def plot_nyquist(comparison: Comparison, ax: Axes | None = None) -> Axes:
-    """Draw the loop L(iω) of each stable candidate with one input around −1."""
+def plot_nyquist(loops: Mapping[str, ComplexArray], looks: Looks, ax: Axes | None = None) -> Axes:
+    """Draw L(iω) of each stable candidate with one input around −1.
+
+    Parameters
+    ----------
+    loops : mapping of str to array, (q,)
+        L(iω) by label.
+    looks : mapping
+        Of `looks`.
+    ax : Axes, optional
+        By default new ones.
+    """
     ax = new_axes(5.2, 5.0) if ax is None else ax
-    for row, colour, style in _candidates(comparison):
-        design, structure = row.design, row.design.structure
-        if structure is None or row.margins is None:
-            continue
-        omega = frequency_grid(design.system())
-        loop = loop_transfer(design.plant, structure, design.K1, design.K2, omega)[0, 0]
-        ax.plot(loop.real, loop.imag, style, color=colour, linewidth=1.1, label=row.label)
+    for label, loop in loops.items():
+        colour, style = looks[label]
+        ax.plot(loop.real, loop.imag, style, color=colour, linewidth=1.1, label=label)
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     ax.plot(np.cos(angle), np.sin(angle), color=GREY, linewidth=0.6)
     ax.plot([-1.0], [0.0], "+", color="black", markersize=10, label="−1")
@@ -87,19 +102,29 @@ def plot_nyquist(comparison: Comparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_dominant_roots(comparison: Comparison, ax: Axes | None = None) -> Axes:
-    """Draw the dominant roots of every candidate and of the open loop."""
+def plot_dominant_roots(
+    dominant: Mapping[str, ComplexArray], looks: Looks, ax: Axes | None = None
+) -> Axes:
+    """Draw the dominant roots of every candidate and of the open loop.
+
+    Parameters
+    ----------
+    dominant : mapping of str to array
+        Roots by label.
+    looks : mapping
+        Of `looks`; what has none is grey.
+    ax : Axes, optional
+        By default new ones.
+    """
     ax = new_axes() if ax is None else ax
-    colours = {row.label: colour for row, colour, _ in _candidates(comparison)}
-    for i, row in enumerate(comparison.rows[: _SHOWN + 1]):
-        roots = np.array([root.value for root in row.design.loop.dominant_roots])
+    for i, (label, roots) in enumerate(dominant.items()):
         both = np.concatenate([roots, roots.conj()])
         ax.plot(
             both.real,
             both.imag,
             MARKERS[i % len(MARKERS)],
-            color=colours.get(row.label, GREY),
-            label=row.label,
+            color=looks[label][0] if label in looks else GREY,
+            label=label,
         )
     ax.axvline(0.0, color="black", linewidth=0.8)
     ax.set_xlabel("Re s")
@@ -109,13 +134,8 @@ def plot_dominant_roots(comparison: Comparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_areas(comparison: Comparison, ax: Axes | None = None) -> Axes | None:
-    """Draw where the gains of each candidate, and no gains, are stable; None without charts."""
-    shown = [row for row, _, _ in _candidates(comparison)][: _SHOWN - 1]
-    shown += [row for row in comparison.rows if row.design.structure is None]
-    charts = {row.label: row.chart for row in shown if row.chart is not None}
-    if not charts:
-        return None
+def plot_areas(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
+    """Draw where the gains of each candidate, and no gains, are stable; see `plot_charts`."""
     ax = plot_charts(charts, ax)
     ax.set_title("Where these gains are stable", fontsize="medium")
     return ax

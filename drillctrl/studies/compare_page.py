@@ -4,28 +4,14 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from drillctrl.base.errors import InputError
-from drillctrl.studies.compare_figure import (
-    plot_areas,
-    plot_dominant_roots,
-    plot_nyquist,
-    plot_responses,
-)
-from drillctrl.studies.comparison_text import (
-    COLUMNS,
-    LEGEND,
-    cells,
-    gains_text,
-    point_text,
-    sentences,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from drillctrl.studies.compare import Comparison
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -94,39 +80,26 @@ def _image(ax: Axes) -> str:
     return base64.b64encode(stream.getvalue()).decode("ascii")
 
 
-def comparison_html(comparison: Comparison) -> str:
-    """Return the page; see `Comparison.to_html`."""
+def comparison_page(draw: Callable[[], Sequence[tuple[str, Axes]]], **values: object) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    draw : callable
+        Returns titles and Axes; called once it is known that the page can be made.
+    **values
+        What the page names: see `Comparison.to_html`.
+
+    Raises
+    ------
+    InputError
+        If jinja2 is not installed.
+    """
     try:
         import jinja2
     except ImportError:
         raise InputError("report", "HTML", "installed: pip install 'drillctrl[report]'") from None
-    figures = [
-        ("Stability charts", plot_areas(comparison)),
-        ("Linear axial motion", plot_responses(comparison, "x", model="linear")),
-        ("Axial motion", plot_responses(comparison, "x")),
-        ("Control", plot_responses(comparison, "torque")),
-        ("Nyquist curves", plot_nyquist(comparison)),
-        ("Dominant roots", plot_dominant_roots(comparison)),
-    ]
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    designs = [(row.label, row.design) for row in comparison.rows]
-    return environment.from_string(_PAGE).render(
-        point=point_text(comparison),
-        sort=comparison.sort,
-        disturbance=", ".join(f"{k} = {v:g}" for k, v in comparison.disturbance.items()),
-        headings=[heading for heading, _, _ in COLUMNS],
-        rows=[(r.label, r.design.stable, cells(r.to_dict())) for r in comparison.rows],
-        legend=LEGEND,
-        sentences=sentences(comparison),
-        gains=[
-            (
-                label,
-                ", ".join(one.structure.outputs),
-                gains_text(one.K1),
-                gains_text(one.K2),
-            )
-            for label, one in designs
-            if one.structure is not None
-        ],
-        figures=[(title, _image(ax)) for title, ax in figures if ax is not None],
-    )
+    images = [(title, _image(ax)) for title, ax in draw()]
+    page: str = environment.from_string(_PAGE).render(figures=images, **values)
+    return page

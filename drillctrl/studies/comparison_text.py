@@ -1,16 +1,13 @@
-"""A comparison as text: the table, and what better costs."""
+"""A comparison in words: the table, and what better costs."""
 
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
-from drillctrl.drilling.point import RigPoint
-from drillctrl.spectrum.characteristic import FloatArray
-
-if TYPE_CHECKING:
-    from drillctrl.studies.compare import Comparison
-
+# Of a row; see `Row.to_dict`.
+Fields = dict[str, Any]
 # Heading, field, format.
 COLUMNS = (
     ("α", "spectral_abscissa", "{:.4f}"),
@@ -40,7 +37,7 @@ LEGEND = (
 )
 
 
-def cells(fields: dict[str, Any]) -> list[str]:
+def cells(fields: Fields) -> list[str]:
     """Return the entries of a row as text."""
     found = []
     for _, name, form in COLUMNS:
@@ -57,75 +54,73 @@ def cells(fields: dict[str, Any]) -> list[str]:
     return found
 
 
-def point_text(comparison: Comparison) -> str:
-    """Say where the candidates were compared."""
-    given = comparison.point
-    point = given.operating_point() if isinstance(given, RigPoint) else given
-    return f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
+def gains_text(gains: Sequence[float]) -> str:
+    """Return gains to the digits that a person reads."""
+    return ", ".join(f"{value:.6g}" for value in gains)
 
 
-def gains_text(gains: FloatArray) -> str:
-    """Return gains, row by row, to the digits that a person reads."""
-    return ", ".join(f"{value:.6g}" for value in gains.ravel())
+def comparison_text(head: str, rows: Sequence[Fields]) -> str:
+    """Return an aligned table, gains, a legend and what better costs.
 
-
-def comparison_text(comparison: Comparison) -> str:
-    """Return an aligned table, gains, a legend and what better costs."""
-    rows = [["", *(heading for heading, _, _ in COLUMNS)]]
-    rows += [[row.label, *cells(row.to_dict())] for row in comparison.rows]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    pushed = ", ".join(f"{k} = {v:g}" for k, v in comparison.disturbance.items())
-    lines = [f"At {point_text(comparison)}; disturbance {pushed}; by {comparison.sort}", ""]
-    for row in rows:
+    Parameters
+    ----------
+    head : str
+        Where the candidates were compared, and how.
+    rows : sequence of dict
+        Of `Row.to_dict`, best first.
+    """
+    table = [["", *(heading for heading, _, _ in COLUMNS)]]
+    table += [[row["label"], *cells(row)] for row in rows]
+    widths = [max(len(row[i]) for row in table) for i in range(len(table[0]))]
+    lines = [head, ""]
+    for row in table:
         first, *others = (
             text.ljust(width) if i == 0 else text.rjust(width)
             for i, (text, width) in enumerate(zip(row, widths, strict=True))
         )
         lines.append("  ".join([first, *others]).rstrip())
     lines.append("")
-    for one in comparison.rows:
-        if one.design.structure is not None:
-            now, past = (gains_text(K) for K in (one.design.K1, one.design.K2))
-            word = "designed" if one.designed else "given"
-            lines.append(f"{one.label} ({word}): K1 = ({now}), K2 = ({past})")
+    for one in rows:
+        if one["structure"] is not None:
+            word = "designed" if one["designed"] else "given"
+            now, past = gains_text(one["K1"]), gains_text(one["K2"])
+            lines.append(f"{one['label']} ({word}): K1 = ({now}), K2 = ({past})")
     lines.append("")
-    for text in sentences(comparison):
+    for text in sentences(rows):
         lines += textwrap.wrap(text, 100)
     lines.append("")
     lines += textwrap.wrap(LEGEND, 100)
     return "\n".join(lines)
 
 
-def sentences(comparison: Comparison) -> list[str]:
+def sentences(rows: Sequence[Fields]) -> list[str]:
     """Say what the first row is better at than the others, and what that costs."""
-    rows = [row for row in comparison.rows if row.design.structure is not None]
-    if not rows:
+    fed = [row for row in rows if row["structure"] is not None]
+    if not fed:
         return []
-    best, *others = rows
-    if not best.design.stable:
+    best, *others = fed
+    if not best["stable"]:
         text = "None of these gains stabilises this point"
         return [f"{text}; the summary of a design says what would."]
-    mine = best.to_dict()
     found = []
     for other in others:
-        fields = other.to_dict()
-        if not other.design.stable:
-            found.append(f"{best.label} stabilises the point, {other.label} does not.")
+        if not other["stable"]:
+            found.append(f"{best['label']} stabilises the point, {other['label']} does not.")
             continue
-        ratio = mine["spectral_abscissa"] / fields["spectral_abscissa"]
-        parts = [f"decays {ratio:.3g} times as fast as {other.label}"]
+        ratio = best["spectral_abscissa"] / other["spectral_abscissa"]
+        parts = [f"decays {ratio:.3g} times as fast as {other['label']}"]
         for name, words in (
             ("max_abs_u", "the torque"),
             ("max_abs_x", "the axial amplitude"),
             ("stability_radius", "the stability radius"),
             ("stable_area", "the stable area"),
         ):
-            if mine[name] and fields[name]:
-                parts.append(f"{mine[name] / fields[name]:.3g} times {words}")
-        if mine["delay_margin"] and fields["delay_margin"]:
-            nearest = [delay_room(f["delay_margin"]) for f in (mine, fields)]
+            if best[name] and other[name]:
+                parts.append(f"{best[name] / other[name]:.3g} times {words}")
+        if best["delay_margin"] and other["delay_margin"]:
+            nearest = [delay_room(f["delay_margin"]) for f in (best, other)]
             parts.append(f"{nearest[0] / nearest[1]:.3g} times the delay margin")
-        found.append(f"{best.label} {parts[0]}, with {', '.join(parts[1:])}.")
+        found.append(f"{best['label']} {parts[0]}, with {', '.join(parts[1:])}.")
     return found
 
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.delay.structure import FeedbackStructure, close_loop
-from drillctrl.delay.system import plant_system
+from drillctrl.delay.closing import close_loop
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller

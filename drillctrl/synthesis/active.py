@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.synthesis.conditions import Conditions, conditions
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily
 

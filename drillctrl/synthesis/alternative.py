@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import LoopFamily
 from drillctrl.synthesis.measures import worst_case

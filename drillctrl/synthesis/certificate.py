@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.conditions import conditions
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily
 from drillctrl.synthesis.search import Search

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily
 
 _TERMS = 6

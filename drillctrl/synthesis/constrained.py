@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.certificate import OptimalityCertificate, shortest_combination
 from drillctrl.synthesis.descent import Objective, bfgs
 from drillctrl.synthesis.family import LoopFamily

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 
 Objective = Callable[[FloatArray], tuple[float, FloatArray]]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.quasipolynomial import from_matrices
 
 # Differences of coefficients below this, relative, are rounding.

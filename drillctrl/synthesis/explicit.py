@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.synthesis.family import LoopFamily
 
 _ABSCISSAS = 40

@@ -10,11 +10,12 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import FeedbackStructure, close_loop, loop_channels
+from drillctrl.delay.closing import close_loop, loop_channels
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
 from drillctrl.synthesis.expansion import Expansion, expand
 

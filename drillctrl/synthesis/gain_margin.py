@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray, magnitude_bound
+from drillctrl.spectrum.characteristic import magnitude_bound
 from drillctrl.synthesis.family import LoopFamily
 
 _FREQUENCIES = 1500

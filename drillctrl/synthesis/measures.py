@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.delay.structure import close_loop, loop_channels
+from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.closing import close_loop, loop_channels
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import ComplexArray, FloatArray
 from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
 from drillctrl.synthesis.descent import Objective
 from drillctrl.synthesis.family import LoopFamily

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 from drillctrl.base.errors import checked_integer, checked_number
-from drillctrl.drilling.point import OperatingPoint
-
-_SAMPLED = (-1.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -40,47 +36,6 @@ class SemiDiscrete:
 
 
 @dataclass(frozen=True)
-class WorstCase:
-    """The largest spectral abscissa over several operating points.
-
-    Attributes
-    ----------
-    psi, delta0, omega0 : float
-        Relative errors, 0 to 0.9, of the point: all corners of the box they span, the
-        middles of its edges and faces, and the point itself are looked at.
-    points : tuple of OperatingPoint
-        More points.
-    """
-
-    psi: float = 0.05
-    delta0: float = 0.0
-    omega0: float = 0.0
-    points: tuple[OperatingPoint, ...] = ()
-    name = "worst-case"
-
-    def __post_init__(self) -> None:
-        for name in ("psi", "delta0", "omega0"):
-            checked_number(f"worst-case {name}", getattr(self, name), 0.0, 0.9)
-
-    def around(self, point: OperatingPoint) -> tuple[OperatingPoint, ...]:
-        """Return all points looked at, the given one first."""
-        sizes = {name: getattr(self, name) for name in ("psi", "delta0", "omega0")}
-        moved = {name: size for name, size in sizes.items() if size > 0.0}
-        corners = itertools.product(_SAMPLED, repeat=len(moved))
-        box = [
-            point.with_changes(
-                **{
-                    name: (1.0 + sign * size) * getattr(point, name)
-                    for sign, (name, size) in zip(signs, moved.items(), strict=True)
-                }
-            )
-            for signs in corners
-            if any(signs)
-        ]
-        return (point, *box, *self.points)
-
-
-@dataclass(frozen=True)
 class Robust:
     """The ε-pseudospectral abscissa: the largest real part under perturbations of size ε.
 
@@ -97,7 +52,14 @@ class Robust:
         checked_number("epsilon", self.epsilon, 1e-8, 1.0)
 
 
-Objective = Exact | SemiDiscrete | WorstCase | Robust
+@dataclass(frozen=True)
+class WorstLoop:
+    """The largest spectral abscissa over several loops, which the caller supplies."""
+
+    name = "worst-case"
+
+
+Objective = Exact | SemiDiscrete | WorstLoop | Robust
 
 
 @dataclass(frozen=True)

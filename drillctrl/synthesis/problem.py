@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.robustness.radius import pseudospectral_abscissa
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.semidiscretization import semidiscretize
 from drillctrl.synthesis import descent, measures
 from drillctrl.synthesis.certificate import OptimalityCertificate, certify_optimality
@@ -21,7 +21,7 @@ from drillctrl.synthesis.objectives import (
     Requirements,
     Robust,
     SemiDiscrete,
-    WorstCase,
+    WorstLoop,
 )
 from drillctrl.synthesis.rounding import hold_multiple_root
 from drillctrl.synthesis.search import global_search
@@ -68,7 +68,7 @@ def solve(
     requirements : Requirements
         What must hold as well.
     others : sequence of LoopFamily
-        Loops at the other points of a `WorstCase`.
+        Further loops of a `WorstLoop`.
     seed : int
         Of the starting points.
     """
@@ -117,7 +117,7 @@ def _goal(
 ) -> descent.Objective:
     if isinstance(objective, SemiDiscrete):
         return measures.growth_rate(family, objective.m, objective.order)
-    if isinstance(objective, WorstCase):
+    if isinstance(objective, WorstLoop):
         return measures.worst_case([family, *others])
     if isinstance(objective, Robust):
         return measures.pseudospectral(family, objective.epsilon)

@@ -14,8 +14,8 @@ from decimal import Context, Decimal, localcontext
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.synthesis.family import LoopFamily
 from drillctrl.synthesis.search import Basin
 

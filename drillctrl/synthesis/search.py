@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.synthesis.descent import bfgs

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.spectrum.batch import spectral_abscissas
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.synthesis.family import ActiveRoot
 from drillctrl.synthesis.objectives import EXACT, Exact, Objective
 from drillctrl.tables.grid import Grid

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure, Tie
-from drillctrl.drilling.plant import INPUT_NAMES, STATE_NAMES
+from drillctrl.drilling.coefficients import INPUT_NAMES, STATE_NAMES
+from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.grid import MAX_NODES, Axis, Grid
 from drillctrl.tables.interpolation import (
     CELL_NAMES,
@@ -120,20 +121,6 @@ def _columns(table: GainTable) -> tuple[dict[str, FloatArray], dict[str, str]]:
         ):
             columns[f"{name}_rig"], units[f"{name}_rig"] = factor * values, unit
     return columns, units
-
-
-def rig_gain_units(structure: FeedbackStructure, rig: Rig | None) -> list[tuple[float, str]] | None:
-    """Return factor and SI unit of each entry of (K1, K2); None without rig units for them."""
-    if rig is None or structure.inputs != ("torque",):
-        return None
-    if not set(structure.outputs) <= {"theta", "dtheta"}:
-        return None
-    # θ is in radians already; θ' is per unit of time, u in units of Kt.
-    known = {
-        "theta": (rig.torsional_stiffness, "N*m/rad"),
-        "dtheta": (rig.torsional_stiffness * rig.time_scale, "N*m*s/rad"),
-    }
-    return [known[output] for output in structure.outputs] * 2
 
 
 def checksum(header: dict[str, Any], columns: dict[str, FloatArray]) -> str:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.spectrum.characteristic import FloatArray
-from drillctrl.tables.grid import Axis
-from drillctrl.tables.interpolation import CONSTANT, UNSAFE, cell_shape
-from drillctrl.tables.table import GainTable
+from drillctrl.base.arrays import FloatArray
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.tables.grid import Axis, Grid
+from drillctrl.tables.interpolation import CONSTANT, UNSAFE, BoolArray, Cells, cell_shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,33 @@ def axis_label(axis: Axis) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def plot_table(table: GainTable) -> Figure:
+class Drawn(NamedTuple):
+    """What is drawn of a table.
+
+    Attributes
+    ----------
+    grid, structure : Grid, FeedbackStructure
+        Operating points, and what is fed back.
+    entries : array, (q, 2 m p)
+        All entries of K1, then K2, at each node.
+    spectral_abscissa, stable : array, (q,)
+        α at each node, and whether it is stable.
+    cells : Cells
+        What is known between the nodes.
+    constant : array, (c, 2 m p)
+        The entries in the cells whose gains are constant.
+    """
+
+    grid: Grid
+    structure: FeedbackStructure
+    entries: FloatArray
+    spectral_abscissa: FloatArray
+    stable: BoolArray
+    cells: Cells
+    constant: FloatArray
+
+
+def plot_table(table: Drawn) -> Figure:
     """Draw each free gain and α over the grid.
 
     Over one axis as lines, over two as maps; over three the gains are those at the middle of
@@ -65,7 +91,7 @@ def plot_table(table: GainTable) -> Figure:
     return figure
 
 
-def _panels(table: GainTable) -> list[Panel]:
+def _panels(table: Drawn) -> list[Panel]:
     free = table.structure.spread.any(axis=1)
     names = np.array(table.structure.entry_names)[free].tolist()
     fields = dict(zip(names, table.entries.T[free], strict=True))
@@ -104,7 +130,7 @@ def _values(fields: dict[str, FloatArray], ax: Axes) -> None:
     ax.set_axis_off()
 
 
-def _line(table: GainTable, along: int, column: int | None, ax: Axes) -> None:
+def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
     """Draw an entry of (K1, K2), or α for None, over the one axis that there is."""
     axis = table.grid.axes[along]
     x = np.array(axis.values) * axis.field_unit[1]
@@ -118,7 +144,7 @@ def _line(table: GainTable, along: int, column: int | None, ax: Axes) -> None:
         ax.legend(fontsize="small")
     else:
         ax.plot(x, values, marker=".", linestyle="")
-        steady = table.entries_of(table.cells.gains)[:, column]
+        steady = table.constant[:, column]
         for i in range(x.size - 1):
             ends = [steady[i]] * 2 if constant[i] else values[i : i + 2]
             ax.plot(x[i : i + 2], ends, color="C0")
@@ -129,9 +155,7 @@ def _line(table: GainTable, along: int, column: int | None, ax: Axes) -> None:
     ax.set_xlabel(axis_label(axis))
 
 
-def _map(
-    table: GainTable, across: int, layer: int, values: FloatArray, colours: str, ax: Axes
-) -> None:
+def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str, ax: Axes) -> None:
     """Draw values over two axes at one value of the third."""
     from matplotlib.patches import Rectangle
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import replacing
+from drillctrl.base.tableio import csv_text
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
 from drillctrl.tables.table import GainTable
 
@@ -89,17 +90,12 @@ def check_table_path(path: str | Path) -> None:
 
 
 def _write_csv(document: Document, file: IO[bytes]) -> None:
-    text = io.StringIO()
-    for name, value in document.header.items():
-        text.write(f"# {name}: {json.dumps(value)}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(document.columns)
+    header = [f"{name}: {json.dumps(value)}" for name, value in document.header.items()]
     lists = [
         [str(bool(v)).lower() for v in values] if name in _WHOLE else map(repr, values.tolist())
         for name, values in document.columns.items()
     ]
-    writer.writerows(zip(*lists, strict=True))
-    file.write(text.getvalue().encode("ascii"))
+    file.write(csv_text(document.columns, zip(*lists, strict=True), header).encode("ascii"))
 
 
 def _read_csv(path: Path) -> Document:

@@ -11,12 +11,12 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.plant import rig_coefficients, steady_load
+from drillctrl.drilling.coefficients import rig_coefficients
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.drilling.steady import rig_parameter_values, rig_point_at_weight_on_bit
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.drilling.steady import rig_parameter_values, rig_point_at_weight_on_bit, steady_load
 
 MAX_NODES = 1_000_000
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.plant import STATE_NAMES
-from drillctrl.tables.document import rig_gain_units, to_document
+from drillctrl.drilling.coefficients import STATE_NAMES
+from drillctrl.drilling.gain_units import rig_gain_units
+from drillctrl.tables.document import to_document
 from drillctrl.tables.grid import DIMENSIONLESS, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
 from drillctrl.tables.table import GainTable

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_number
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.tables.table import GainTable
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import BoolArray, FeedbackStructure
-from drillctrl.spectrum.batch import spectral_abscissas
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.tables.continuation import edges
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CONSTANT, Cells, cell_shape, corners_of

@@ -11,28 +11,19 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.delay.structure import FeedbackStructure, preset_structure
-from drillctrl.spectrum.characteristic import FloatArray
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.structures import as_structure
 from drillctrl.synthesis.objectives import EXACT, Exact, Objective
+from drillctrl.tables.cells import cell_tasks, check_cells, joined
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
-from drillctrl.tables.interpolation import (
-    CELL_NAMES,
-    UNSAFE,
-    BoolArray,
-    Cells,
-    cell_tasks,
-    check_cells,
-    interpolated,
-    joined,
-    place,
-)
-from drillctrl.tables.node import NodeDesign, NodeTask, check_node
+from drillctrl.tables.interpolation import CELL_NAMES, UNSAFE, BoolArray, Cells, interpolated, place
+from drillctrl.tables.node import NodeDesign, NodeTask, check_node, find_design, keep_design
 from drillctrl.tables.refinement import carried_over, refined_grid
-from drillctrl.tables.remembering import find_design, keep_design
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
 if TYPE_CHECKING:
@@ -231,9 +222,19 @@ class GainTable:
 
     def plot(self) -> Figure:
         """Draw gains and α over the grid; see `drillctrl.tables.figure.plot_table`."""
-        from drillctrl.tables.figure import plot_table
+        from drillctrl.tables.figure import Drawn, plot_table
 
-        return plot_table(self)
+        return plot_table(
+            Drawn(
+                self.grid,
+                self.structure,
+                self.entries,
+                self.spectral_abscissa,
+                self.stable,
+                self.cells,
+                self.entries_of(self.cells.gains),
+            )
+        )
 
     def __repr__(self) -> str:
         size = " × ".join(str(n) for n in self.grid.shape)
@@ -290,7 +291,7 @@ def table(
     InputError
         If an argument is out of range or the structure does not fit the plant.
     """
-    chosen = preset_structure(structure) if isinstance(structure, str) else structure
+    chosen = as_structure(structure)
     chosen = chosen.with_bounds(bounds or {})
     share = checked_number("give_up", give_up, 0.0, 0.9)
     rounds = checked_integer("refine", refine, 0, 6)

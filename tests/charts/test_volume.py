@@ -19,7 +19,6 @@ from drillctrl import (
     semidiscretize,
     stability_volume,
 )
-from drillctrl.charts.volume_figure import plot_slices
 
 POINT = OperatingPoint(10.0, 1.75, 14.0)
 
@@ -88,7 +87,7 @@ def test_meshes_open_elsewhere(volume, tmp_path, ending):
 def test_figures_have_what_they_say(volume):
     ax = volume.plot()
     assert len(ax.collections) == 1
-    ax = plot_slices(volume, 4)
+    ax = volume.plot_slices(4)
     assert len(ax.get_legend().get_texts()) == 4
 
 

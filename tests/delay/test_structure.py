@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 
 from drillctrl import InputError, close_loop, plant_system, preset_structure
-from drillctrl.delay.structure import STRUCTURE_NAMES
+from drillctrl.drilling.structures import STRUCTURE_NAMES
 
 from ..strategies import points
 

@@ -4,15 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drillctrl import OperatingPoint, RigPoint, plant_system, table1
-from drillctrl.drilling.plant import (
-    RIG_PARAMETER_NAMES,
-    dimensional_plant,
-    dimensionless_plant,
-    linearisation,
-    linearisation_sensitivity,
-    parameter_vector,
-    rhs_function,
-)
+from drillctrl.drilling.coefficients import RIG_PARAMETER_NAMES
+from drillctrl.drilling.linear import linearisation, linearisation_sensitivity, parameter_vector
+from drillctrl.drilling.plant import dimensional_plant, dimensionless_plant, rhs_function
 from drillctrl.drilling.steady import rig_parameter_values
 
 from ..strategies import points

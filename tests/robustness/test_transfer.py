@@ -9,13 +9,8 @@ from drillctrl import (
     preset_structure,
     spectral_abscissa,
 )
-from drillctrl.robustness.transfer import (
-    frequency_grid,
-    frequency_response,
-    loop_frd,
-    loop_transfer,
-    to_frd,
-)
+from drillctrl.interop.responses import loop_frd, to_frd
+from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
 from drillctrl.spectrum import characteristic
 
 GAINS = [-5.17], [5.06]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Controller, simulate
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.run import simulate
 
 NAMES = ("x", "dx", "theta", "dtheta")
 KICK = {"dx": 1.0, "dtheta": 1.0}

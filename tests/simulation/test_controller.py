@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Change, Controller, Scenario, simulate
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Change, Scenario
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 GAINS = ("case1", [-3.82], [3.61])

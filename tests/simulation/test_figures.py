@@ -8,14 +8,14 @@ import pytest
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import new_axes
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Controller, simulate
+from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.figure import (
     plot_against_linear,
-    plot_motion,
     plot_phase_portrait,
     plot_rock_face,
     plot_signal,
 )
+from drillctrl.simulation.run import simulate
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 KICK = {"dx": 1.0, "dtheta": 1.0}
@@ -45,7 +45,7 @@ def test_sticks_and_limits_are_shaded(stick_slip):
         POINT, Controller("case1", [-3.82], [3.61], limit=0.3), duration=20.0, initial=KICK
     )
     assert len(shaded(plot_signal(limited, "torque"))) == len(limited.phases("saturated")) > 0
-    assert [ax.get_ylabel() for ax in plot_motion(limited).axes][-1] == "control u"
+    assert [ax.get_ylabel() for ax in limited.plot().axes][-1] == "control u"
 
 
 def test_the_portrait_marks_where_the_bit_stands(stick_slip):

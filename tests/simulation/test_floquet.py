@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import close_loop
-from drillctrl.delay.system import plant_system
+from drillctrl.delay.closing import close_loop
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.sensors import with_actuator_lag
-from drillctrl.simulation import Change, Controller, Scenario, simulate
+from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.floquet import floquet, multipliers_at
 from drillctrl.simulation.orbits import limit_cycle
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.spectrum.roots import dominant_roots
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Controller, Scenario, simulate
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Scenario
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 KICK = {"dx": 1.0, "dtheta": 1.0}

@@ -8,8 +8,10 @@ import pytest
 from drillctrl import RigPoint, steady_state, table1
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Controller, Scenario, simulate
+from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.export import export_motion
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Scenario
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 BOUNCING = OperatingPoint(4.0, 4.0, 30.0)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drillctrl import InputError, close_loop, dominant_roots, plant_system, preset_structure
-from drillctrl.spectrum.sensitivity import root_sensitivity
+from drillctrl.designs.sensitivity import root_sensitivity
 
 from ..strategies import points
 

@@ -11,10 +11,12 @@ import pytest
 from drillctrl import dimensionless_grid, linear_axis, table
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import close_loop, preset_structure
-from drillctrl.delay.system import plant_system
+from drillctrl.delay.closing import close_loop
+from drillctrl.drilling.linear import plant_system
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation import Controller, simulate
+from drillctrl.drilling.structures import preset_structure
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.run import simulate
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.studies.campaign import campaign
 

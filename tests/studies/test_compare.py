@@ -20,9 +20,9 @@ from drillctrl import (
     preset_structure,
     spectral_abscissa,
 )
-from drillctrl.simulation import simulate
+from drillctrl.robustness.loop_margins import loop_margins
+from drillctrl.simulation.run import simulate
 from drillctrl.simulation.summary import settling_time
-from drillctrl.studies.measures import loop_margins
 
 PAPER = [
     ("paper p", "p", [-1.55], None),
@@ -72,8 +72,8 @@ def test_margins_agree_with_python_control_and_with_the_spectrum(name, K1, K2):
     point = OperatingPoint(10.0, 12.0, 14.0)
     K2 = [0.0] * len(K1) if K2 == 0 else K2
     given = analyze(point, name, K1, K2)
-    margins = loop_margins(given)
     structure = preset_structure(name)
+    margins = loop_margins(given.plant, structure, given.K1, given.K2)
     theirs = control.stability_margins(loop_frd(given.plant, structure, K1, K2), returnall=True)
     assert margins.phase == pytest.approx(np.abs(theirs[1]).min(), abs=1e-4)
     for factor in (margins.gain_up, margins.gain_down):

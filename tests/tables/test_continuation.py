@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drillctrl import OperatingPoint, design, dimensionless_grid, linear_axis
-from drillctrl.delay.structure import preset_structure
+from drillctrl.drilling.structures import preset_structure
 from drillctrl.tables.continuation import design_grid, excess
 from drillctrl.tables.node import NodeDesign, NodeTask, design_node
 

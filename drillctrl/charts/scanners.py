@@ -1,0 +1,93 @@
+"""Which scanner suits the axes of a chart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.charts.affine_scan import affine_loops, scan_affine
+from drillctrl.charts.axes import Axis
+from drillctrl.charts.counting_scan import scan_counting
+from drillctrl.charts.delay_scan import scan_rotary_speed
+from drillctrl.charts.plane import Plane
+from drillctrl.charts.scan import ScanLine, Scanner
+from drillctrl.spectrum.quasipolynomial import from_matrices
+
+_SHORTEST_DELAY_SHARE = 1e-3
+
+
+def _transposed(plane: Plane, rows: bool) -> Any:
+    """Return matrices(position, along) for lines held at y (rows) or at x."""
+    if rows:
+        return lambda position, along: plane.matrices(along, position)
+    return plane.matrices
+
+
+def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
+    """Whether the characteristic function is affine in the scanned parameter."""
+    if scanned.name in ("omega0", "speed"):
+        return False
+    matrices = _transposed(plane, rows)
+    t = held.low + held.span * np.array([0.31, 0.83])
+    tables = []
+    for share in (0.0, 0.37, 1.0):
+        loops = from_matrices(*matrices(t, np.full(2, scanned.low + share * scanned.span)))
+        tables.append(np.pad(loops.coefficients, ((0, 0), (0, 0), (0, 4)))[:, :, :4])
+    middle = tables[0] + 0.37 * (tables[2] - tables[0])
+    return bool(np.abs(middle - tables[1]).max() <= 1e-9 * np.abs(tables[1]).max())
+
+
+def choose_scanner(plane: Plane, level: float) -> tuple[str, bool, Scanner]:
+    """Return the method, whether its lines are rows, and the scanner."""
+    x, y = plane.x, plane.y
+    if level == 0.0:
+        for scanned, rows in ((x, True), (y, False)):
+            if scanned.name == "omega0":
+                return "delay", rows, _delay_scanner(plane, scanned, rows=rows)
+    for scanned, held, rows in ((y, x, False), (x, y, True)):
+        if _is_affine(plane, held, scanned, rows=rows):
+            return "affine", rows, _affine_scanner(plane, scanned, level, rows=rows)
+    return "counting", False, _counting_scanner(plane, level)
+
+
+def _delay_scanner(plane: Plane, scanned: Axis, *, rows: bool) -> Scanner:
+    matrices = _transposed(plane, rows)
+    turn = 2.0 * np.pi / plane.point.blades
+
+    def scan(positions: FloatArray) -> list[ScanLine]:
+        loops = from_matrices(*matrices(positions, np.full(positions.size, scanned.high)))
+        return scan_rotary_speed(loops, positions, scanned.low, scanned.high, turn)
+
+    return scan
+
+
+def _affine_scanner(plane: Plane, scanned: Axis, level: float, *, rows: bool) -> Scanner:
+    matrices = _transposed(plane, rows)
+    low, high = scanned.low, scanned.high
+
+    def scan(positions: FloatArray) -> list[ScanLine]:
+        ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
+        loops = affine_loops(ends[0], ends[1], low, high, level)
+        return scan_affine(loops, positions, low, high, level)
+
+    return scan
+
+
+def _counting_scanner(plane: Plane, level: float) -> Scanner:
+    low, high = first_position(plane.y), plane.y.high
+
+    def scan(positions: FloatArray) -> list[ScanLine]:
+        return scan_counting(plane.matrices, positions, low, high, level)
+
+    return scan
+
+
+def first_position(axis: Axis) -> float:
+    """Return where lines may begin: ω0 and the rotary speed exclude zero."""
+    if axis.name in ("omega0", "speed") and axis.low == 0.0:
+        return _SHORTEST_DELAY_SHARE * axis.high
+    if axis.name == "rock_strength" and axis.low == 0.0:
+        return 1e-9 * axis.high
+    return axis.low

@@ -1,0 +1,107 @@
+"""Close the loop around a system, and what it takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import DelaySystem
+
+
+def gain_matrices(
+    feedback: FeedbackStructure, K1: npt.ArrayLike, K2: npt.ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return K1 and K2 as (m, p) arrays from flat lists, checked against the structure.
+
+    Gains outside the structure's bounds are permitted; they bind the design only.
+
+    Raises
+    ------
+    InputError
+        If a gain is missing, not finite, or not zero where the structure has none.
+    """
+    shape = feedback.K1_lower.shape
+    matrices = []
+    for name, given in (("K1", K1), ("K2", K2)):
+        try:
+            flat = np.atleast_1d(np.asarray(0.0 if given is None else given, dtype=float)).ravel()
+        except (TypeError, ValueError):
+            raise InputError(name, repr(given), "a list of numbers") from None
+        if given is None:
+            flat = np.zeros(shape).ravel()
+        if flat.size != shape[0] * shape[1]:
+            count = shape[0] * shape[1]
+            raise InputError(name, flat.tolist(), f"{count} gain(s), one for each output")
+        if not np.isfinite(flat).all():
+            raise InputError(name, flat.tolist(), "finite")
+        matrices.append(flat.reshape(shape))
+    unused = (feedback.K2_lower.ravel() == 0.0) & (feedback.K2_upper.ravel() == 0.0)
+    if matrices[1].ravel()[unused].any():
+        raise InputError("K2", matrices[1].ravel().tolist(), f"0 for structure {feedback.name}")
+    return matrices[0], matrices[1]
+
+
+def close_loop(
+    system: DelaySystem,
+    feedback: FeedbackStructure,
+    K1: npt.ArrayLike,
+    K2: npt.ArrayLike | None = None,
+    delay: float | None = None,
+) -> DelaySystem:
+    """Close the loop: A0 + B K1 C and Aτ + B K2 C (Eq. 40).
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        Names the outputs and the inputs.
+    K1, K2 : array_like, (m, p) or flat
+        Gains on Y(t) and on Y(t − delay).
+    delay : float, optional
+        Delay of the fed-back signals; by default the largest delay of the plant.
+
+    Returns
+    -------
+    DelaySystem
+        The same states, inputs and outputs; u is what is added to the feedback.
+    """
+    now, past = gain_matrices(feedback, K1, K2)
+    drive, measure = loop_channels(system, feedback)
+    delay = system.max_delay if delay is None else checked_number("delay", delay, 0.0)
+    matrices = dict(zip(system.delays, system.delayed, strict=True))
+    if past.any():
+        matrices[delay] = system.delayed_matrix(delay) + drive @ past @ measure
+    delays = tuple(sorted(matrices))
+    return replace(
+        system,
+        A0=system.A0 + drive @ now @ measure,
+        delayed=tuple(matrices[tau] for tau in delays),
+        delays=delays,
+    )
+
+
+def loop_channels(
+    system: DelaySystem, feedback: FeedbackStructure
+) -> tuple[FloatArray, FloatArray]:
+    """Return the columns of B and the rows of C that a structure uses.
+
+    Raises
+    ------
+    InputError
+        If the plant has no such input or output.
+    """
+    for name in feedback.inputs:
+        if name not in system.input_names:
+            raise InputError("input", name, f"one of {', '.join(system.input_names)}")
+    for name in feedback.outputs:
+        if name not in system.output_names:
+            raise InputError("output", name, f"one of {', '.join(system.output_names)}")
+    columns = [system.input_names.index(name) for name in feedback.inputs]
+    rows = [system.output_names.index(name) for name in feedback.outputs]
+    return system.B[:, columns], system.C[rows]

@@ -1,0 +1,296 @@
+"""Candidates side by side: what was measured of each."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.tableio import csv_text
+from drillctrl.base.text import finite_or_none
+from drillctrl.designs.result import Design
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.robustness.loop_margins import LoopMargins
+from drillctrl.robustness.transfer import frequency_grid, loop_transfer
+from drillctrl.studies.comparison_text import (
+    COLUMNS,
+    LEGEND,
+    cells,
+    comparison_text,
+    gains_text,
+    sentences,
+)
+from drillctrl.studies.measures import Response
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from drillctrl.charts.chart import StabilityChart
+
+
+CSV_COLUMNS = (
+    "label",
+    "structure",
+    "designed",
+    "stable",
+    "spectral_abscissa",
+    "decay_time",
+    "stability_radius",
+    "gain_margin",
+    "gain_reduction",
+    "phase_margin",
+    "peak_sensitivity",
+    "max_abs_u",
+    "max_abs_x",
+    "settling_time",
+    "nonlinear_settling_time",
+    "nonlinear_max_abs_u",
+    "nonlinear_max_abs_x",
+    "stick_fraction",
+    "period",
+    "status",
+    "basin",
+    "formation_change",
+    "stable_area",
+    "area_ratio",
+)
+
+
+OPEN_LOOP = "none"
+# Whether a larger value is the better one.
+SORTS = {
+    "spectral_abscissa": False,
+    "stability_radius": True,
+    "delay_margin": True,
+    "phase_margin": True,
+    "peak_sensitivity": False,
+    "max_abs_u": False,
+    "max_abs_x": False,
+    "settling_time": False,
+    "basin": True,
+    "stable_area": True,
+    "formation_change": True,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One candidate and its measures; None stands for what does not exist.
+
+    Attributes
+    ----------
+    label : str
+        Its name in the table.
+    design : Design
+        Its gains and linear analysis.
+    designed : bool
+        Whether the gains were designed here.
+    margins : LoopMargins or None
+        Of a stable loop with one input.
+    linear, nonlinear : Response or None
+        After the disturbance.
+    basin : float or None
+        Multiple of the disturbance that still settles; see `measures.basin`.
+    chart : StabilityChart or None
+        Where the same gains are stable.
+    area_ratio : float or None
+        Stable area over that of the open loop.
+    """
+
+    label: str
+    design: Design
+    designed: bool
+    margins: LoopMargins | None
+    linear: Response | None
+    nonlinear: Response | None
+    basin: float | None
+    chart: StabilityChart | None
+    area_ratio: float | None
+
+    @property
+    def formation_change(self) -> float | None:
+        """Smallest relative change of ψ, up or down, that destabilises; linear."""
+        margins = self.design.point_margins
+        return None if margins is None else min(margins["psi"].upper, -margins["psi"].lower)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of a row."""
+        design, margins, linear, bent = self.design, self.margins, self.linear, self.nonlinear
+        alpha = design.spectral_abscissa
+        delays = design.delay_margin
+        summary = None if bent is None else bent.run.summary
+        return {
+            "label": self.label,
+            "structure": None if design.structure is None else design.structure.name,
+            "K1": design.K1.ravel().tolist(),
+            "K2": design.K2.ravel().tolist(),
+            "designed": self.designed,
+            "stable": design.stable,
+            "spectral_abscissa": alpha,
+            "decay_time": -1.0 / alpha if design.stable else None,
+            "stability_radius": design.stability_radius.value,
+            "delay_margin": None
+            if delays is None
+            else {"shorter": delays.shorter, "longer": finite_or_none(delays.longer)},
+            "gain_margin": None if margins is None else finite_or_none(margins.gain_up),
+            "gain_reduction": None if margins is None else margins.gain_down,
+            "phase_margin": None if margins is None else finite_or_none(margins.phase),
+            "peak_sensitivity": None if margins is None else margins.sensitivity,
+            "max_abs_u": None if linear is None else linear.max_abs_u,
+            "max_abs_x": None if linear is None else linear.max_abs_x,
+            "settling_time": None if linear is None else linear.settling_time,
+            "nonlinear_settling_time": None if bent is None else bent.settling_time,
+            "nonlinear_max_abs_u": None if bent is None else bent.max_abs_u,
+            "nonlinear_max_abs_x": None if bent is None else bent.max_abs_x,
+            "stick_fraction": None if summary is None else summary.stick_fraction,
+            "period": None if summary is None else summary.period,
+            "status": None if bent is None else bent.run.status,
+            "basin": self.basin,
+            "formation_change": self.formation_change,
+            "stable_area": None if self.chart is None else self.chart.stable_area,
+            "area_ratio": self.area_ratio,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Candidates side by side.
+
+    Attributes
+    ----------
+    point : OperatingPoint or RigPoint
+        Where they were compared.
+    rows : tuple of Row
+        Best first by ``sort``; those without the measure last.
+    sort : str
+        One of `SORTS`.
+    disturbance : mapping
+        What the responses follow: a perturbation of steady drilling at t = 0.
+    duration : float
+        Length of the simulations.
+    elapsed_seconds : float
+        Wall time.
+    """
+
+    point: OperatingPoint | RigPoint
+    rows: tuple[Row, ...]
+    sort: str
+    disturbance: Mapping[str, float]
+    duration: float
+    elapsed_seconds: float
+
+    def summary(self) -> str:
+        """Return the table and what better costs, for people."""
+
+        pushed = ", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items())
+        head = f"At {self._point_text()}; disturbance {pushed}; by {self.sort}"
+        return comparison_text(head, [row.to_dict() for row in self.rows])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of the command line."""
+        point = self._operating_point()
+        return {
+            "schema": "drillctrl/compare/1",
+            "operating_point": {**dataclasses.asdict(point), "delay": point.delay},
+            "sort": self.sort,
+            "disturbance": dict(self.disturbance),
+            "duration": self.duration,
+            "rows": [row.to_dict() for row in self.rows],
+            "elapsed_seconds": self.elapsed_seconds,
+        }
+
+    def to_csv(self) -> str:
+        """Return one line a candidate."""
+        rows = []
+        for row in self.rows:
+            fields = row.to_dict()
+            delays = fields["delay_margin"] or {"shorter": None, "longer": None}
+            gains = (" ".join(repr(value) for value in fields[name]) for name in ("K1", "K2"))
+            values = [fields[name] for name in CSV_COLUMNS]
+            rows.append([*values, delays["shorter"], delays["longer"], *gains])
+        return csv_text([*CSV_COLUMNS, "delay_shorter", "delay_longer", "K1", "K2"], rows)
+
+    def to_html(self) -> str:
+        """Return one page with the table and the figures in it.
+
+        Raises
+        ------
+        InputError
+            If jinja2 is not installed.
+        """
+        from drillctrl.studies.compare_page import comparison_page
+
+        rows = [row.to_dict() for row in self.rows]
+        designs = [row.design for row in self.rows]
+        return comparison_page(
+            self.figures,
+            point=self._point_text(),
+            sort=self.sort,
+            disturbance=", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items()),
+            headings=[heading for heading, _, _ in COLUMNS],
+            rows=[(row["label"], row["stable"], cells(row)) for row in rows],
+            legend=LEGEND,
+            sentences=sentences(rows),
+            gains=[
+                (
+                    row["label"],
+                    ", ".join(design.structure.outputs),
+                    gains_text(row["K1"]),
+                    gains_text(row["K2"]),
+                )
+                for row, design in zip(rows, designs, strict=True)
+                if design.structure is not None
+            ],
+        )
+
+    def _operating_point(self) -> OperatingPoint:
+        given = self.point
+        return given.operating_point() if isinstance(given, RigPoint) else given
+
+    def _point_text(self) -> str:
+        """Say where the candidates were compared."""
+        point = self._operating_point()
+        return f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
+
+    def figures(self) -> list[tuple[str, Axes]]:
+        """Draw charts, motions, Nyquist curves and roots; return each with its title."""
+        from drillctrl.studies import compare_figure as figure
+
+        fed = [row for row in self.rows if row.design.structure is not None]
+        looks = figure.looks([row.label for row in fed])
+        shown = [row for row in self.rows if row.label in looks]
+        stable = [row for row in shown if row.design.stable]
+        linear = {row.label: row.linear for row in stable if row.linear is not None}
+        bent = {row.label: row.nonlinear for row in stable if row.nonlinear is not None}
+        loops = {row.label: _loop(row.design) for row in shown if row.margins is not None}
+        roots = {
+            row.label: np.array([root.value for root in row.design.loop.dominant_roots])
+            for row in self.rows[: figure.SHOWN + 1]
+        }
+        charted = [*shown[: figure.SHOWN - 1], *(row for row in self.rows if row not in fed)]
+        charts = {row.label: row.chart for row in charted if row.chart is not None}
+        drawn = [("Stability charts", figure.plot_areas(charts))] if charts else []
+        return [
+            *drawn,
+            ("Linear axial motion", figure.plot_responses(linear, looks, "x", model="linear")),
+            ("Axial motion", figure.plot_responses(bent, looks, "x")),
+            ("Control", figure.plot_responses(bent, looks, "torque")),
+            ("Nyquist curves", figure.plot_nyquist(loops, looks)),
+            ("Dominant roots", figure.plot_dominant_roots(roots, looks)),
+        ]
+
+    def __repr__(self) -> str:
+        names = ", ".join(row.label for row in self.rows)
+        return f"<Comparison of {names}, by {self.sort}>"
+
+
+def _loop(design: Design) -> ComplexArray:
+    """Return L(iω) of a loop with one input, over frequencies that resolve it."""
+    assert design.structure is not None
+    omega = frequency_grid(design.system())
+    data = loop_transfer(design.plant, design.structure, design.K1, design.K2, omega)
+    return np.asarray(data[0, 0])
