@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from drillctrl.charts.stabilisable import StabilisableChart, stabilisable_chart
     from drillctrl.charts.volume import StabilityVolume, stability_volume
     from drillctrl.delay.closing import close_loop
+    from drillctrl.delay.instrumentation import with_actuator_lag, with_filter
     from drillctrl.delay.structure import FeedbackStructure, Tie
     from drillctrl.delay.system import DelaySystem
     from drillctrl.designs.design import analyze, design
@@ -26,13 +27,18 @@ if TYPE_CHECKING:
     from drillctrl.designs.result import Design
     from drillctrl.designs.sensitivity import root_sensitivity
     from drillctrl.designs.worst_case import WorstCase
-    from drillctrl.drilling.drive import top_drive_plant
-    from drillctrl.drilling.linear import plant_system
-    from drillctrl.drilling.plant import Plant, dimensional_plant, dimensionless_plant
+    from drillctrl.drilling.bit_rock import BitRock, Contact, Load, PaperLaw, Rates
+    from drillctrl.drilling.block import Block
+    from drillctrl.drilling.case import Case, as_case, plant_system
+    from drillctrl.drilling.coefficients import Coefficients
+    from drillctrl.drilling.drive import TopDrive
+    from drillctrl.drilling.friction import Stribeck
+    from drillctrl.drilling.plant import Plant, paper_plant, top_drive_plant
     from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.drilling.rig import Rig, load_rig, save_rig, table1
-    from drillctrl.drilling.sensors import with_actuator_lag, with_filter
+    from drillctrl.drilling.sensors import Filtered, Lagging
     from drillctrl.drilling.steady import SteadyState, rig_point_at_weight_on_bit, steady_state
+    from drillctrl.drilling.string import String, StringModel
     from drillctrl.drilling.structures import feed, preset_structure, soft_torque
     from drillctrl.interop.controllers import controller_system, scheduled_controller
     from drillctrl.interop.lifted import lifted_system, pade_approximation
@@ -76,23 +82,33 @@ if TYPE_CHECKING:
 _HOME = {
     "Agreement": "paper.agreement",
     "Axis": "tables.grid",
+    "BitRock": "drilling.bit_rock",
+    "Block": "drilling.block",
     "Campaign": "studies.campaign",
+    "Case": "drilling.case",
     "Change": "simulation.scenario",
     "Checkpoint": "base.checkpoint",
+    "Coefficients": "drilling.coefficients",
     "Comparison": "studies.comparison",
+    "Contact": "drilling.bit_rock",
     "Controller": "simulation.controller",
     "DelaySystem": "delay.system",
     "Design": "designs.result",
     "Exact": "synthesis.objectives",
     "FeedbackStructure": "delay.structure",
+    "Filtered": "drilling.sensors",
     "GainSurface": "charts.discretised",
     "GainTable": "tables.table",
     "Grid": "tables.grid",
     "InputError": "base.errors",
+    "Lagging": "drilling.sensors",
+    "Load": "drilling.bit_rock",
     "LoopAnalysis": "designs.loop_analysis",
     "OperatingPoint": "drilling.point",
+    "PaperLaw": "drilling.bit_rock",
     "Past": "simulation.past",
     "Plant": "drilling.plant",
+    "Rates": "drilling.bit_rock",
     "Requirements": "synthesis.objectives",
     "Rig": "drilling.rig",
     "RigPoint": "drilling.point",
@@ -107,10 +123,15 @@ _HOME = {
     "StabilityChart": "charts.chart",
     "StabilityVolume": "charts.volume",
     "SteadyState": "drilling.steady",
+    "Stribeck": "drilling.friction",
+    "String": "drilling.string",
+    "StringModel": "drilling.string",
     "Tie": "delay.structure",
+    "TopDrive": "drilling.drive",
     "WorstCase": "designs.worst_case",
     "analyze": "designs.design",
     "analyze_loop": "designs.loop_analysis",
+    "as_case": "drilling.case",
     "band_energy": "simulation.energy",
     "campaign": "studies.campaign",
     "characteristic_roots": "spectrum.roots",
@@ -122,9 +143,7 @@ _HOME = {
     "count_right_of": "spectrum.count",
     "delay_margin": "robustness.margins",
     "design": "designs.design",
-    "dimensional_plant": "drilling.plant",
     "dimensionless_grid": "tables.grid",
-    "dimensionless_plant": "drilling.plant",
     "dominant_roots": "spectrum.roots",
     "feed": "drilling.structures",
     "floquet": "simulation.floquet",
@@ -140,8 +159,9 @@ _HOME = {
     "loop_frd": "interop.responses",
     "loop_transfer": "robustness.transfer",
     "pade_approximation": "interop.lifted",
+    "paper_plant": "drilling.plant",
     "parameter_margin": "robustness.margins",
-    "plant_system": "drilling.linear",
+    "plant_system": "drilling.case",
     "point_margins": "designs.margins",
     "preset_structure": "drilling.structures",
     "prove_count": "spectrum.proof",
@@ -168,9 +188,9 @@ _HOME = {
     "table": "tables.table",
     "table1": "drilling.rig",
     "to_frd": "interop.responses",
-    "top_drive_plant": "drilling.drive",
-    "with_actuator_lag": "drilling.sensors",
-    "with_filter": "drilling.sensors",
+    "top_drive_plant": "drilling.plant",
+    "with_actuator_lag": "delay.instrumentation",
+    "with_filter": "delay.instrumentation",
 }
 
 
@@ -189,23 +209,33 @@ def __dir__() -> list[str]:
 __all__ = [
     "Agreement",
     "Axis",
+    "BitRock",
+    "Block",
     "Campaign",
+    "Case",
     "Change",
     "Checkpoint",
+    "Coefficients",
     "Comparison",
+    "Contact",
     "Controller",
     "DelaySystem",
     "Design",
     "Exact",
     "FeedbackStructure",
+    "Filtered",
     "GainSurface",
     "GainTable",
     "Grid",
     "InputError",
+    "Lagging",
+    "Load",
     "LoopAnalysis",
     "OperatingPoint",
+    "PaperLaw",
     "Past",
     "Plant",
+    "Rates",
     "Requirements",
     "Rig",
     "RigPoint",
@@ -220,10 +250,15 @@ __all__ = [
     "StabilityChart",
     "StabilityVolume",
     "SteadyState",
+    "Stribeck",
+    "String",
+    "StringModel",
     "Tie",
+    "TopDrive",
     "WorstCase",
     "analyze",
     "analyze_loop",
+    "as_case",
     "band_energy",
     "campaign",
     "characteristic_roots",
@@ -235,9 +270,7 @@ __all__ = [
     "count_right_of",
     "delay_margin",
     "design",
-    "dimensional_plant",
     "dimensionless_grid",
-    "dimensionless_plant",
     "dominant_roots",
     "feed",
     "floquet",
@@ -253,6 +286,7 @@ __all__ = [
     "loop_frd",
     "loop_transfer",
     "pade_approximation",
+    "paper_plant",
     "parameter_margin",
     "plant_system",
     "point_margins",

@@ -9,7 +9,7 @@ from drillctrl.base import units
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.units import Dimension
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.point import RigPoint
+from drillctrl.drilling.case import Case
 
 # Permitted range and symbol of each dimensionless group.
 GROUPS = {
@@ -57,7 +57,7 @@ class Axis:
 
 
 def make_axis(
-    given: Axis | Sequence[object], structure: FeedbackStructure | None, rig_point: RigPoint | None
+    given: Axis | Sequence[object], structure: FeedbackStructure | None, case: Case
 ) -> Axis:
     """Check an axis given as (name, low, high).
 
@@ -67,8 +67,8 @@ def make_axis(
         Limits are numbers; for rig axes numbers in rpm, m/h or MPa, or texts with a unit.
     structure : FeedbackStructure or None
         Whose gains may be axes.
-    rig_point : RigPoint or None
-        Without it there are no rig axes.
+    case : Case
+        Its groups and the parameters of its plant's parts may be axes, and numbers of its rig.
 
     Raises
     ------
@@ -82,13 +82,17 @@ def make_axis(
     except (TypeError, ValueError):
         raise InputError("axis", repr(given), "a name and two limits") from None
     gains = structure.gain_names if structure is not None else ()
-    rigs = tuple(RIG_AXES) if rig_point is not None else ()
-    known = (*GROUPS, *rigs, *gains)
+    rigs = tuple(RIG_AXES) if case.rig_point is not None else ()
+    own = tuple(case.plant.own) if case.plant is not None else ()
+    groups = tuple(GROUPS) if case.drills else ()
+    known = (*groups, *own, *rigs, *gains)
     if not isinstance(name, str) or name not in known:
         raise InputError("axis", str(name), f"one of {', '.join(known)}")
     floor, ceiling, unit, label = -1e6, 1e6, "", gain_label(name)
     if name in GROUPS:
         floor, ceiling, label = GROUPS[name]
+    elif name in own:
+        label = name.replace("_", " ")
     elif name in RIG_AXES:
         floor, ceiling = 0.0, 1e6
         unit, dimension, word = RIG_AXES[name]

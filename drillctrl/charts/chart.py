@@ -18,7 +18,7 @@ from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.charts.sweep import sweep
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.case import Where
 from drillctrl.spectrum.count import count_right_of
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ class StabilityChart:
 
 
 def chart(
-    point: OperatingPoint | RigPoint,
+    point: Where,
     x: AxisLike = ("omega0", 0.5, 25.0),
     y: AxisLike = ("delta0", 0.0, 15.0),
     structure: str | FeedbackStructure | None = None,
@@ -159,8 +159,8 @@ def chart(
 
     Parameters
     ----------
-    point : OperatingPoint or RigPoint
-        Supplies all parameters that are no axis.
+    point : OperatingPoint, RigPoint, DelaySystem or Case
+        Supplies all parameters that are no axis; of a DelaySystem gains alone are axes.
     x, y : (name, low, high)
         A group (``"omega0"``, ``"delta0"``, ``"psi"``, ``"eta"``, ``"xi"``, ``"kappa"``,
         ``"damping"``), a gain (``"K1_1"``, …), and for a rig ``"speed"`` in rpm, ``"rop"``

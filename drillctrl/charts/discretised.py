@@ -7,7 +7,7 @@ surface stand the exact boundary and the exact optimum.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,8 +24,7 @@ from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
 from drillctrl.designs.result import Design
-from drillctrl.drilling.linear import plant_system
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.structures import as_structure
 from drillctrl.spectrum.semidiscretization import semidiscretize
 
@@ -39,8 +38,8 @@ class GainSurface:
 
     Attributes
     ----------
-    point : OperatingPoint
-        Where the rig drills.
+    case : Case
+        What drills, and where.
     chart : StabilityChart
         Where the gains stabilise, without discretisation.
     optimum : Design
@@ -53,7 +52,7 @@ class GainSurface:
         Of the semi-discretisation.
     """
 
-    point: OperatingPoint
+    case: Case
     chart: StabilityChart
     optimum: Design
     x: FloatArray
@@ -88,14 +87,15 @@ class GainSurface:
         ax.plot(*([v] for v in self.lowest[:2]), "o", mfc="none", color=GREY, label="lowest ρ(D)")
         ax.set_xlabel(axis_text(self.chart.plane.x))
         ax.set_ylabel(axis_text(self.chart.plane.y))
-        p = self.point
-        ax.set_title(f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}", fontsize="medium")
+        p = self.case.point
+        if p is not None:
+            ax.set_title(f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}", fontsize="medium")
         ax.legend(loc="best", fontsize="small")
         return ax
 
 
 def gain_surface(
-    point: OperatingPoint,
+    point: Where,
     structure: str | FeedbackStructure = "case1",
     *,
     m: int = 20,
@@ -106,7 +106,7 @@ def gain_surface(
 
     Parameters
     ----------
-    point : OperatingPoint
+    point : OperatingPoint, RigPoint, DelaySystem or Case
         Where the rig drills.
     structure : str or FeedbackStructure
         With two free gains.
@@ -124,7 +124,8 @@ def gain_surface(
     number = checked_integer("count", count, 2, 1001)
     if len(chosen.gain_names) != 2:
         raise InputError("structure", chosen.name, "one with two gains")
-    plant = plant_system(point, chosen.inputs)
+    case = as_case(point)
+    plant = case.system(chosen.inputs)
     x, y = (
         np.linspace(low, high, number) for low, high in zip(chosen.lower, chosen.upper, strict=True)
     )
@@ -139,7 +140,7 @@ def gain_surface(
     ]
     fixed = chosen.gains(np.zeros(2))
     exact = chart(point, axes[0], axes[1], chosen, *fixed)
-    return GainSurface(point, exact, design(point, chosen), x, y, radius, m, order)
+    return GainSurface(case, exact, design(case, chosen), x, y, radius, m, order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +190,7 @@ class RootLocus:
 
 
 def root_locus(
-    point: OperatingPoint,
+    point: Where,
     axis: AxisLike = ("omega0", 3.0, 24.0),
     structure: str | FeedbackStructure | None = None,
     K1: npt.ArrayLike | None = None,
@@ -203,10 +204,10 @@ def root_locus(
 
     Parameters
     ----------
-    point : OperatingPoint
-        Supplies the other groups.
+    point : OperatingPoint, RigPoint or Case
+        Supplies the other parameters.
     axis : (name, low, high)
-        A group.
+        A group, or a parameter of the plant's parts.
     structure, K1, K2 : optional
         As in `chart`.
     m, order : int
@@ -217,15 +218,17 @@ def root_locus(
     Raises
     ------
     InputError
-        If the axis is no group, or a number is out of range.
+        If there is no such parameter, or a number is out of range.
     """
-    chosen = make_axis(axis, None, None)
+    case = as_case(point)
+    case.physics("a root locus over a parameter")
+    # Numbers of the rig would move several groups at once.
+    case = replace(case, rig_point=None)
+    chosen = make_axis(axis, None, case)
     number = checked_integer("count", count, 2, 100_000)
-    if chosen.name not in GROUPS:
-        raise InputError("axis", chosen.name, f"one of {', '.join(GROUPS)}")
     other: Sequence[object] = ("psi", 0.0, 1.0) if chosen.name != "psi" else ("omega0", 1.0, 2.0)
-    plane = make_plane(point, chosen, other, structure, K1, K2)
+    plane = make_plane(case, chosen, other, structure, K1, K2)
     values = np.linspace(chosen.low, chosen.high, number)
-    held = getattr(point, str(other[0]))
+    held = case.parameters[str(other[0])]
     found = [semidiscretize(plane.system(v, held), m, order).multipliers() for v in values]
     return RootLocus(chosen, values, np.array(found), m, order)

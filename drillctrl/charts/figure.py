@@ -79,6 +79,9 @@ def axis_text(axis: Axis) -> str:
 def plane_title(plane: Plane) -> str:
     """Say what is held in the chart."""
     point = plane.point
+    head = "open loop" if plane.structure is None else plane.structure.name
+    if point is None:
+        return head
     held = {
         "omega0": (f"$\\omega_0$ = {point.omega0:g}", {"speed"}),
         "delta0": (f"$\\delta_0$ = {point.delta0:g}", {"speed", "rop", "rock_strength"}),
@@ -88,7 +91,6 @@ def plane_title(plane: Plane) -> str:
     }
     over = {plane.x.name, plane.y.name}
     parts = [text for name, (text, also) in held.items() if name not in over and not also & over]
-    head = "open loop" if plane.structure is None else plane.structure.name
     return f"{head}: {', '.join(parts)}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,7 @@ from drillctrl.delay.closing import close_loop, gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.loops import gains_along, loop_arrays
-from drillctrl.drilling.coefficients import PARAMETER_NAMES
-from drillctrl.drilling.linear import parameter_vector, plant_system
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import as_structure
 
@@ -32,10 +31,8 @@ class Plane:
 
     Attributes
     ----------
-    point : OperatingPoint
+    case : Case
         Supplies what the axes do not.
-    rig_point : RigPoint or None
-        The rig behind the point.
     structure : FeedbackStructure or None
         What is fed back; None for the open loop.
     K1, K2 : array, (m, p)
@@ -44,31 +41,38 @@ class Plane:
         The two parameters.
     """
 
-    point: OperatingPoint
-    rig_point: RigPoint | None
+    case: Case
     structure: FeedbackStructure | None
     K1: FloatArray
     K2: FloatArray
     x: Axis
     y: Axis
 
-    def _parameters(self, values: dict[str, FloatArray], count: int) -> FloatArray:
-        """Return the groups of every place, shape (N, 9)."""
+    @property
+    def point(self) -> OperatingPoint | None:
+        """The operating point, if the physics is known."""
+        return self.case.point
+
+    @property
+    def rig_point(self) -> RigPoint | None:
+        """The rig behind it, if one was given."""
+        return self.case.rig_point
+
+    def _parameters(self, values: dict[str, FloatArray], count: int) -> dict[str, FloatArray]:
+        """Return the parameters that vary, by name; those of a rig as the groups they move."""
         given = {name: v for name, v in values.items() if name in RIG_AXES}
-        if given:
-            assert self.rig_point is not None
-            rows = [
-                parameter_vector(self._at_rig({k: float(v[i]) for k, v in given.items()}))
-                for i in range(count)
-            ]
-            table = np.array(rows)
-        else:
-            table = np.tile(parameter_vector(self.point), (count, 1))
-        for name, column in values.items():
-            for target in ("xi", "kappa") if name == "damping" else (name,):
-                if target in PARAMETER_NAMES:
-                    table[:, PARAMETER_NAMES.index(target)] = column
-        return table
+        own = {n: v for n, v in values.items() if n not in RIG_AXES and not self._is_gain(n)}
+        if not given:
+            return own
+        points = [self._at_rig({k: float(v[i]) for k, v in given.items()}) for i in range(count)]
+        groups = {
+            field.name: np.array([getattr(point, field.name) for point in points], dtype=float)
+            for field in dataclasses.fields(OperatingPoint)
+        }
+        return {**groups, **own}
+
+    def _is_gain(self, name: str) -> bool:
+        return self.structure is not None and name in self.structure.gain_names
 
     def _at_rig(self, values: dict[str, float]) -> OperatingPoint:
         point = self.rig_point
@@ -90,26 +94,27 @@ class Plane:
     def matrices(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return A0 (N, n, n), A1 (N, n, n) and τ (N,) of the loops at N places."""
         values = {self.x.name: x, self.y.name: y}
-        table = self._parameters(values, x.size)
-        return loop_arrays(self.point, table.T, self.structure, *self._gains(values, x.size))
+        gains = self._gains(values, x.size)
+        return loop_arrays(
+            self.case, self._parameters(values, x.size), x.size, self.structure, *gains
+        )
 
-    def operating_point(self, x: float, y: float) -> OperatingPoint:
-        """Return the operating point at one place."""
+    def case_at(self, x: float, y: float) -> Case:
+        """Return the case at one place."""
         values = {self.x.name: np.array([x]), self.y.name: np.array([y])}
-        row = self._parameters(values, 1)[0]
-        changes = dict(zip(PARAMETER_NAMES, row.tolist(), strict=True))
-        return replace(self.point, **changes)
+        changes = {name: float(v[0]) for name, v in self._parameters(values, 1).items()}
+        if "damping" in changes:
+            changes["xi"] = changes["kappa"] = changes.pop("damping")
+        return self.case.with_changes(**changes) if changes else self.case
 
     def system(self, x: float, y: float) -> DelaySystem:
         """Return the loop at one place, by the route that designs and analyses take."""
-        point = self.operating_point(x, y)
+        case = self.case_at(x, y)
         if self.structure is None:
-            return plant_system(point)
+            return case.system()
         values = {self.x.name: np.array([x]), self.y.name: np.array([y])}
         now, past = self._gains(values, 1)
-        return close_loop(
-            plant_system(point, self.structure.inputs), self.structure, now[0], past[0]
-        )
+        return close_loop(case.system(self.structure.inputs), self.structure, now[0], past[0])
 
 
 def check_plane(plane: Plane) -> None:
@@ -130,7 +135,7 @@ def check_plane(plane: Plane) -> None:
 
 
 def make_plane(
-    point: OperatingPoint | RigPoint,
+    point: Where,
     x: AxisLike,
     y: AxisLike,
     structure: str | FeedbackStructure | None,
@@ -144,14 +149,9 @@ def make_plane(
     InputError
         If axes, structure and gains do not fit together.
     """
-    if isinstance(point, RigPoint):
-        where, rig_point = point.operating_point(), point
-    elif isinstance(point, OperatingPoint):
-        where, rig_point = point, None
-    else:
-        raise InputError("point", type(point).__name__, "an OperatingPoint or a RigPoint")
+    case = as_case(point)
     chosen = None if structure is None else as_structure(structure)
-    axes = [make_axis(axis, chosen, rig_point) for axis in (x, y)]
+    axes = [make_axis(axis, chosen, case) for axis in (x, y)]
     if chosen is None:
         if K1 is not None or K2 is not None:
             raise InputError("structure", "(missing)", "given together with gains")
@@ -164,7 +164,7 @@ def make_plane(
             raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
         none = np.zeros(chosen.K1_lower.shape)
         now, past = gain_matrices(chosen, none if K1 is None else K1, none if K2 is None else K2)
-    plane = Plane(where, rig_point, chosen, now, past, *axes)
+    plane = Plane(case, chosen, now, past, *axes)
     check_plane(plane)
     return plane
 
@@ -177,7 +177,7 @@ def plane_fields(plane: Plane) -> dict[str, Any]:
         for key, axis in (("x", plane.x), ("y", plane.y))
     }
     return {
-        "operating_point": dataclasses.asdict(plane.point),
+        "operating_point": plane.point and dataclasses.asdict(plane.point),
         "axes": axes,
         "structure": structure.name if structure else None,
         "K1": plane.K1.ravel().tolist(),

@@ -39,12 +39,22 @@ def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
     return bool(np.abs(middle - tables[1]).max() <= 1e-9 * np.abs(tables[1]).max())
 
 
+def _moves_delay_alone(plane: Plane, scanned: Axis, *, rows: bool) -> bool:
+    """Whether the rotary speed enters through the delay only: not with every friction law."""
+    held = plane.y if rows else plane.x
+    middle = np.full(2, held.low + 0.43 * held.span)
+    low = max(scanned.low, 1e-3 * scanned.high)
+    a0, a1, _ = _transposed(plane, rows)(middle, np.array([low, scanned.high]))
+    return bool(np.allclose(a0[0], a0[1], rtol=1e-12, atol=0.0) and
+                np.allclose(a1[0], a1[1], rtol=1e-12, atol=0.0))  # fmt: skip
+
+
 def choose_scanner(plane: Plane, level: float) -> tuple[str, bool, Scanner]:
     """Return the method, whether its lines are rows, and the scanner."""
     x, y = plane.x, plane.y
     if level == 0.0:
         for scanned, rows in ((x, True), (y, False)):
-            if scanned.name == "omega0":
+            if scanned.name == "omega0" and _moves_delay_alone(plane, scanned, rows=rows):
                 return "delay", rows, _delay_scanner(plane, scanned, rows=rows)
     for scanned, held, rows in ((y, x, False), (x, y, True)):
         if _is_affine(plane, held, scanned, rows=rows):
@@ -54,7 +64,8 @@ def choose_scanner(plane: Plane, level: float) -> tuple[str, bool, Scanner]:
 
 def _delay_scanner(plane: Plane, scanned: Axis, *, rows: bool) -> Scanner:
     matrices = _transposed(plane, rows)
-    turn = 2.0 * np.pi / plane.point.blades
+    _, point = plane.case.physics("an axis omega0")
+    turn = 2.0 * np.pi / point.blades
 
     def scan(positions: FloatArray) -> list[ScanLine]:
         loops = from_matrices(*matrices(positions, np.full(positions.size, scanned.high)))

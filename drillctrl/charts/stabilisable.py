@@ -18,7 +18,7 @@ from drillctrl.charts.scanners import first_position
 from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
 from drillctrl.charts.sweep import sweep
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.case import Where
 from drillctrl.drilling.structures import as_structure
 from drillctrl.synthesis.gain_margin import check_gains
 
@@ -175,7 +175,7 @@ class StabilisableChart:
 
 
 def stabilisable_chart(
-    point: OperatingPoint | RigPoint,
+    point: Where,
     x: AxisLike = ("omega0", 0.5, 25.0),
     y: AxisLike = ("delta0", 0.0, 15.0),
     structure: str | FeedbackStructure = "case1",
@@ -190,7 +190,7 @@ def stabilisable_chart(
 
     Parameters
     ----------
-    point : OperatingPoint or RigPoint
+    point : OperatingPoint, RigPoint or Case
         Supplies all parameters that are no axis.
     x, y : (name, low, high)
         As for `chart`, but no gains.
@@ -274,7 +274,8 @@ def _shortest_speed(plane: Plane, axis: Axis) -> float:
     """
     start = first_position(axis)
     if axis.name in ("omega0", "speed"):
-        slowest = 2.0 * math.pi / (plane.point.blades * _LONGEST_DELAY)
+        _, point = plane.case.physics("an axis omega0")
+        slowest = 2.0 * math.pi / (point.blades * _LONGEST_DELAY)
         if axis.name == "speed":
             assert plane.rig_point is not None
             slowest *= 30.0 / math.pi / plane.rig_point.rig.time_scale

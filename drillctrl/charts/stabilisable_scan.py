@@ -17,7 +17,6 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.linear import plant_system
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.gain_margin import GainMargin, gain_margin
 
@@ -67,8 +66,8 @@ def scan_stabilisable(
     for position in positions.tolist():
 
         def margin(y: float, x: float = position) -> GainMargin:
-            point = plane.operating_point(x, y)
-            return gain_margin(loop_family(plant_system(point), structure), level)
+            plant = plane.case_at(x, y).system(structure.inputs)
+            return gain_margin(loop_family(plant, structure), level)
 
         lines.append(_scan(margin, position, start, plane.y.high, samples))
         if progress is not None:

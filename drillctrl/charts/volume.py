@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,14 +14,14 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.files import replacing
-from drillctrl.charts.axes import GROUPS, Axis, make_axis
+from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chains import stable_curves
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.plane import AxisLike, Plane, make_plane
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case, Where, as_case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,9 +77,9 @@ class StabilityVolume:
     def slice_at(self, z: float) -> StabilityChart:
         """Draw one cross-section as a chart of its own, with its own accuracy (Figs. 6, 7)."""
         plane = self.planes[0]
-        point = _moved(plane.point, self.z.name, z)
+        case = _moved(plane.case, self.z.name, z)
         gains = (plane.structure, plane.K1, plane.K2) if plane.structure is not None else ()
-        return chart(point, plane.x, plane.y, *gains)
+        return chart(case, plane.x, plane.y, *gains)
 
     def surface(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Return the boundary as quadrilaterals between neighbouring lines and slices.
@@ -200,9 +200,9 @@ class StabilityVolume:
         return f"<StabilityVolume over {self.z.name}: {self.volume:.5g} ± {self.volume_error:.1g}>"
 
 
-def _moved(point: OperatingPoint, name: str, value: float) -> OperatingPoint:
+def _moved(case: Case, name: str, value: float) -> Case:
     names = ("xi", "kappa") if name == "damping" else (name,)
-    return point.with_changes(**dict.fromkeys(names, float(value)))
+    return case.with_changes(**dict.fromkeys(names, float(value)))
 
 
 def _area(lines: Sequence[ScanLine], stride: int) -> float:
@@ -215,7 +215,7 @@ def _area(lines: Sequence[ScanLine], stride: int) -> float:
 
 
 def stability_volume(
-    point: OperatingPoint,
+    point: Where,
     x: AxisLike = ("omega0", 0.5, 24.0),
     y: AxisLike = ("delta0", 0.0, 5.0),
     z: AxisLike = ("psi", 0.1, 26.0),
@@ -231,12 +231,12 @@ def stability_volume(
 
     Parameters
     ----------
-    point : OperatingPoint
+    point : OperatingPoint, RigPoint or Case
         Supplies all parameters that are no axis.
     x, y : (name, low, high)
         As in `chart`.
     z : (name, low, high)
-        A group of the point.
+        A group of the point, or a parameter of the plant's parts.
     structure, K1, K2 : optional
         As in `chart`.
     slices, lines : int
@@ -253,18 +253,18 @@ def stability_volume(
     began = time.perf_counter()
     count = checked_integer("slices", slices, 3, 10_001)
     number = checked_integer("lines", lines, 3, 10_001)
-    if not isinstance(point, OperatingPoint):
-        raise InputError("point", type(point).__name__, "an OperatingPoint")
-    third = make_axis(z, None, None)
-    if third.name not in GROUPS:
-        raise InputError("z", third.name, f"one of {', '.join(GROUPS)}")
+    case = as_case(point)
+    case.physics("a volume over parameters")
+    # Numbers of the rig would move several groups at once.
+    case = replace(case, rig_point=None)
+    third = make_axis(z, None, case)
     positions = np.linspace(first_position(third), third.high, count)
     planes, found = [], []
     rows = False
     for done, value in enumerate(positions):
         if progress is not None:
             progress("slices", done, count)
-        plane = make_plane(_moved(point, third.name, value), x, y, structure, K1, K2)
+        plane = make_plane(_moved(case, third.name, value), x, y, structure, K1, K2)
         if third.name in (plane.x.name, plane.y.name):
             raise InputError("z", third.name, "another parameter than x and y")
         _, rows, scanner = choose_scanner(plane, 0.0)

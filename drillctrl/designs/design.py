@@ -17,9 +17,7 @@ from drillctrl.designs.loop_analysis import DEFAULT_ORDER
 from drillctrl.designs.remedies import Remedy, remedies
 from drillctrl.designs.result import Design, assess
 from drillctrl.designs.worst_case import WorstCase
-from drillctrl.drilling.case import Where, subject_of
-from drillctrl.drilling.linear import plant_system
-from drillctrl.drilling.plant import Plant
+from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.structures import as_structure
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis import problem
@@ -34,15 +32,14 @@ def design(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     objective: Objective = EXACT,
     requirements: Requirements = NO_REQUIREMENTS,
-    plant: Plant | None = None,
     seed: int = 0,
 ) -> Design:
     """Design bounded gains that minimise the spectral abscissa of the closed loop.
 
     Parameters
     ----------
-    point : OperatingPoint, RigPoint or DelaySystem
-        Where the rig drills; or any linear plant.
+    point : OperatingPoint, RigPoint, DelaySystem or Case
+        What drills, and where: a point is the paper's plant there.
     structure : str or FeedbackStructure
         A preset (``"p"``, ``"case1"``, ``"pd"``, ``"case2"``) or a structure.
     bounds : mapping, optional
@@ -51,8 +48,6 @@ def design(
         What to minimise instead of the spectral abscissa.
     requirements : Requirements
         What must hold beside the bounds.
-    plant : Plant, optional
-        Physics other than those of `dimensionless_plant`, with the same parameters.
     seed : int
         Of the starting points. The same seed gives the same gains.
 
@@ -66,21 +61,20 @@ def design(
     ------
     InputError
         If the structure does not fit the plant, a bound is wrong, or a worst case is asked
-        for without an operating point.
+        for where the physics is not known.
     """
     began = time.perf_counter()
     chosen = as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
-    subject = subject_of(point, chosen.inputs, plant)
-    family = loop_family(subject.plant, chosen)
+    case = as_case(point)
+    family = loop_family(case.system(chosen.inputs), chosen)
     others = []
     if isinstance(objective, WorstCase):
-        if subject.point is None:
-            raise InputError("objective", objective.name, "used with an operating point")
-        for other in objective.around(subject.point)[1:]:
-            others.append(loop_family(plant_system(other, chosen.inputs, plant), chosen))
+        _, here = case.physics(f"objective {objective.name}")
+        for other in objective.around(here)[1:]:
+            others.append(loop_family(case.at(other).system(chosen.inputs), chosen))
     solution = problem.solve(family, objective, requirements, others, seed)
-    result = assess(subject, chosen, *chosen.gains(solution.gains))
+    result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
     value = problem.reported_value(family, objective, solution.gains)
     return replace(
@@ -121,14 +115,13 @@ def analyze(
     *,
     m: int | None = None,
     order: int = DEFAULT_ORDER,
-    plant: Plant | None = None,
 ) -> Design:
     """Analyse given gains, or the open loop.
 
     Parameters
     ----------
-    point : OperatingPoint, RigPoint or DelaySystem
-        Where the rig drills; or any linear plant.
+    point : OperatingPoint, RigPoint, DelaySystem or Case
+        What drills, and where: a point is the paper's plant there.
     structure : str or FeedbackStructure, optional
         Without it, the open loop.
     K1, K2 : array_like, optional
@@ -136,8 +129,6 @@ def analyze(
         back.
     m, order : int, optional
         Of the semi-discretisation that is reported; see `semidiscretize`.
-    plant : Plant, optional
-        Physics other than those of `dimensionless_plant`.
 
     Raises
     ------
@@ -149,7 +140,7 @@ def analyze(
         if K1 is not None or K2 is not None:
             raise InputError("structure", "(missing)", "given together with gains")
         none = np.zeros((0, 0))
-        result = assess(subject_of(point, ("torque",), plant), None, none, none, m, order)
+        result = assess(as_case(point), None, none, none, m, order)
     else:
         chosen = as_structure(structure)
         if K1 is None:
@@ -157,7 +148,7 @@ def analyze(
         if K2 is None and (chosen.K2_upper.any() or chosen.K2_lower.any()):
             raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
         gains = gain_matrices(chosen, K1, K2)
-        result = assess(subject_of(point, chosen.inputs, plant), chosen, *gains, m, order)
+        result = assess(as_case(point), chosen, *gains, m, order)
     result = replace(result, elapsed_seconds=time.perf_counter() - began, seek=_remedies)
     if m is not None or order != DEFAULT_ORDER:
         # Refused now rather than when it is read.

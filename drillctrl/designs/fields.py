@@ -177,11 +177,11 @@ def _rig_fields(rig_point: RigPoint, design: Design) -> dict[str, Any]:
         "axial_scale": rig_point.rig.axial_scale,
         **dataclasses.asdict(steady),
     }
-    if design.structure is not None and design.structure.inputs == ("torque",):
-        factors, names = gain_units(design.structure, rig_point)
+    if design.structure is not None and design.case.plant is not None:
+        factors, names = gain_units(design.structure, design.case.plant, rig_point.rig)
         fields["K1"] = (design.K1 * factors).ravel().tolist()
         fields["K2"] = (design.K2 * factors).ravel().tolist()
-        fields["gain_units"] = names
+        fields["gain_units"] = [name for row in names for name in row]
     settling = design.loop.settling_time * rig_point.rig.time_scale
     fields["settling_time_seconds"] = finite_or_none(settling)
     return fields

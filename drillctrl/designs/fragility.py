@@ -11,9 +11,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
-from drillctrl.drilling.linear import plant_system
-from drillctrl.drilling.plant import Plant
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case
 from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.spectrum.roots import spectral_abscissa
 
@@ -78,27 +76,21 @@ def fragility(
     return Fragility(spectral_abscissa(rounded), *(values.get(name) for name in names))
 
 
-def perturbed_plants(
-    plant: DelaySystem,
-    point: OperatingPoint | None = None,
-    physics: Plant | None = None,
-) -> dict[str, DelaySystem]:
+def perturbed_plants(plant: DelaySystem, case: Case | None = None) -> dict[str, DelaySystem]:
     """Return plants by the names of `Fragility`'s fields, as far as they exist.
 
     Parameters
     ----------
     plant : DelaySystem
         The plant as assumed.
-    point : OperatingPoint, optional
-        Where it drills; without it, ψ cannot change.
-    physics : Plant, optional
-        The plant's equations; by default `dimensionless_plant`.
+    case : Case, optional
+        What it is the system of; without physics, ψ cannot change.
     """
     changed = {}
-    if point is not None:
+    if case is not None and case.point is not None:
         for name, factor in (("psi_low", 0.95), ("psi_high", 1.05)):
-            rock = point.with_changes(psi=factor * point.psi)
-            changed[name] = plant_system(rock, plant.input_names, physics)
+            rock = case.with_changes(psi=factor * case.point.psi)
+            changed[name] = rock.system(plant.input_names)
     if plant.delays:
         changed["delay_low"] = with_delay_factor(plant, 0.98)
         changed["delay_high"] = with_delay_factor(plant, 1.02)

@@ -11,15 +11,13 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.closing import loop_channels
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.coefficients import INPUT_NAMES, PARAMETER_NAMES
-from drillctrl.drilling.linear import linearisation, parameter_vector, plant_system
-from drillctrl.drilling.plant import dimensionless_plant
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.delay.system import DelaySystem
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.spectrum.batch import batch_abscissas
 
 
 def spectral_abscissas(
-    point: OperatingPoint,
+    point: Where,
     parameters: Mapping[str, npt.ArrayLike] | None = None,
     structure: FeedbackStructure | None = None,
     gains: npt.ArrayLike | None = None,
@@ -29,10 +27,11 @@ def spectral_abscissas(
 
     Parameters
     ----------
-    point : OperatingPoint
-        Supplies the parameters that do not vary.
+    point : OperatingPoint, RigPoint, DelaySystem or Case
+        Supplies the parameters that do not vary. Of a DelaySystem only gains may vary.
     parameters : mapping of str to array_like, (q,), optional
-        Values of the parameters that vary, by name.
+        Values of the parameters that vary, by name: groups, or parameters of the plant's
+        parts. λ keeps its ratio to ψ.
     structure : FeedbackStructure, optional
         Without it the open loop.
     gains : array_like, (q, k) or (k,), optional
@@ -48,8 +47,10 @@ def spectral_abscissas(
     Raises
     ------
     InputError
-        If a name is unknown, lengths differ or a value is out of range.
+        If a name is unknown, lengths differ, a value is out of range, or the system has more
+        than one delay.
     """
+    case = as_case(point)
     varied = {name: np.atleast_1d(np.asarray(v, float)) for name, v in (parameters or {}).items()}
     vectors = None
     if structure is not None:
@@ -64,20 +65,13 @@ def spectral_abscissas(
     count = max(lengths, default=1)
     if not lengths <= {1, count}:
         raise InputError("parameters", sorted(lengths), "arrays of one length")
-    table = np.tile(parameter_vector(point)[:, None], (1, count))
     for name, values in varied.items():
-        if name not in PARAMETER_NAMES:
-            raise InputError("parameters", name, f"one of {', '.join(PARAMETER_NAMES)}")
         # The two ends of the range decide whether all of it is permitted.
         for value in (values.min(), values.max()):
-            point.with_changes(**{name: float(value)})
-        table[PARAMETER_NAMES.index(name)] = values
-    a0, delayed, delay = plant_arrays(table)
-    # The plant delays one signal: every row of A1 is a multiple of its last.
-    right = delayed[:, 3:, :]
-    left = delayed @ right.transpose(0, 2, 1) / (right**2).sum(axis=2, keepdims=True)
+            case.with_changes(**{name: float(value)})
+    a0, left, right, delay = plant_arrays(case, varied, count)
     if structure is not None and vectors is not None:
-        drive, measure = _channels(point, structure)
+        drive, measure = loop_channels(case.system(), structure)
         now, past = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
         a0 = a0 + drive @ now @ measure
         if past.any():
@@ -86,46 +80,77 @@ def spectral_abscissas(
     return batch_abscissas(a0, left, right, delay, workers)
 
 
-def plant_arrays(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return A0 (q, n, n), A1 (q, n, n) and τ0 (q,) for every column of parameters."""
-    count = table.shape[1]
-    mapped = linearisation(dimensionless_plant()).map(count)
-    a0, a1, _drive, tau = (value.full() for value in mapped(table))
-    n = a0.shape[0]
-    a0 = a0.reshape(n, count, n).transpose(1, 0, 2)
-    a1 = a1.reshape(n, count, n).transpose(1, 0, 2)
-    return a0, a1, tau.ravel()
+def plant_arrays(
+    case: Case, values: Mapping[str, npt.ArrayLike], count: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return plants of one delay over parameters that vary.
+
+    Parameters
+    ----------
+    case : Case
+        Supplies the others.
+    values : mapping
+        Parameter → value of each, (q,).
+    count : int
+        q.
+
+    Returns
+    -------
+    A0 : array, (q, n, n)
+    left, right : array, (q, n, r) and (q, r, n)
+        Factors of the delayed matrix.
+    delay : array, (q,)
+        τ0.
+
+    Raises
+    ------
+    InputError
+        If there are several delays, or parameters vary of what has none.
+    """
+    if case.drills:
+        arrays = case.linear_arrays(case.table(values, count))
+        if arrays.late:
+            raise InputError("plant", "with signals that arrive late", "of one delay here")
+        return arrays.A0, arrays.left, arrays.right, arrays.delay
+    if values:
+        case.physics(f"an axis {next(iter(values))}")
+    system = case.system()
+    left, right = _one_delay(system)
+    copies = [np.broadcast_to(m, (count, *m.shape)) for m in (system.A0, left, right)]
+    return copies[0], copies[1], copies[2], np.full(count, system.max_delay)
+
+
+def _one_delay(system: DelaySystem) -> tuple[FloatArray, FloatArray]:
+    if len(system.delays) != 1:
+        raise InputError("system", f"{len(system.delays)} delays", "one of one delay here")
+    return system.factors[0]
 
 
 def loop_arrays(
-    point: OperatingPoint,
-    table: FloatArray,
+    case: Case,
+    values: Mapping[str, npt.ArrayLike],
+    count: int,
     structure: FeedbackStructure | None,
     K1: FloatArray,
     K2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return A0 (q, n, n), A1 (q, n, n) and τ0 (q,) of loops at many points.
+    """Return A0 (q, n, n), A1 (q, n, n) and τ0 (q,) of loops over parameters and gains.
 
     Parameters
     ----------
-    point : OperatingPoint
-        Any of them.
-    table : array, (9, q)
-        Parameters of each, in the order of `PARAMETER_NAMES`.
+    case, values, count
+        As for `plant_arrays`.
     structure : FeedbackStructure or None
         What is fed back.
     K1, K2 : array, (q, m, p)
         Gains of each.
     """
-    a0, a1, tau = plant_arrays(table)
+    a0, left, right, tau = plant_arrays(case, values, count)
+    a1 = left @ right
     if structure is not None:
-        drive, measure = _channels(point, structure)
+        drive, measure = loop_channels(case.system(), structure)
         a0, a1 = a0 + drive @ K1 @ measure, a1 + drive @ K2 @ measure
     return np.ascontiguousarray(a0), np.ascontiguousarray(a1), tau
-
-
-def _channels(point: OperatingPoint, structure: FeedbackStructure) -> tuple[FloatArray, FloatArray]:
-    return loop_channels(plant_system(point, INPUT_NAMES), structure)
 
 
 def gains_along(

@@ -6,30 +6,25 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
-from drillctrl.drilling.linear import plant_system
-from drillctrl.drilling.plant import Plant
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Where, as_case
 from drillctrl.robustness.margins import ParameterMargin, parameter_margin
 
 
 def point_margins(
-    point: OperatingPoint,
+    point: Where,
     feedback: FeedbackStructure,
     K1: FloatArray,
     K2: FloatArray,
-    physics: Plant | None = None,
     limit: float = 1.0,
 ) -> dict[str, ParameterMargin]:
     """Return how wrong ψ, δ0 and ω0 may each be before a loop with fixed gains is unstable.
 
     Parameters
     ----------
-    point : OperatingPoint
+    point : OperatingPoint, RigPoint or Case
         As assumed by the designer.
     feedback, K1, K2 : FeedbackStructure and arrays
         The feedback. Its delay stays that of the assumed speed.
-    physics : Plant, optional
-        The plant's equations; by default `dimensionless_plant`.
     limit : float
         Largest relative increase to look at.
 
@@ -43,14 +38,14 @@ def point_margins(
     InputError
         If the loop is unstable at the point.
     """
-    inputs = feedback.inputs
-    assumed = plant_system(point, inputs, physics).max_delay
+    case, inputs = as_case(point), feedback.inputs
+    _, here = case.physics("a margin of the point")
+    assumed = case.system(inputs).max_delay
 
     def margin(name: str) -> ParameterMargin:
         def loop_at(error: float) -> DelaySystem:
-            there = point.with_changes(**{name: getattr(point, name) * (1.0 + error)})
-            plant = plant_system(there, inputs, physics)
-            return close_loop(plant, feedback, K1, K2, delay=assumed)
+            there = case.with_changes(**{name: getattr(here, name) * (1.0 + error)})
+            return close_loop(there.system(inputs), feedback, K1, K2, delay=assumed)
 
         return parameter_margin(loop_at, limit)
 

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.linear import plant_system
-from drillctrl.drilling.plant import dimensionless_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structure
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -91,13 +89,12 @@ def remedies(
     """
     if failed.stable or failed.point is None or failed.structure is None:
         return ()
-    where = failed.point if failed.rig_point is None else failed.rig_point
     found: list[Remedy] = []
     for kind, candidate in _candidates(failed):
         if kind == "structure" and any(remedy.kind == kind for remedy in found):
             # The presets become richer: the first that stabilises is the simplest.
             continue
-        result = design(where, candidate, plant=failed.physics)
+        result = design(failed.case, candidate)
         if result.stable:
             found.append(Remedy(kind, candidate.name, result))
     faster = _stable_speed(failed, analyze)
@@ -113,7 +110,7 @@ def _candidates(failed: Design) -> Iterator[tuple[str, FeedbackStructure]]:
             preset = preset_structure(name)
             if _offers_more(preset, structure):
                 yield "structure", preset
-    physics = dimensionless_plant() if failed.physics is None else failed.physics
+    physics, _ = failed.case.physics("a remedy")
     if "axial" in structure.inputs or "axial" not in physics.input_names:
         return
     yield "feed", feed()
@@ -154,7 +151,7 @@ def _stable_speed(failed: Design, analyze: Callable[..., Design]) -> Design | No
         return point.with_changes(omega0=point.omega0 * factor, delta0=point.delta0 / factor)
 
     def alpha(factor: float) -> float:
-        return spectral_abscissa(plant_system(at(factor), (), failed.physics))
+        return spectral_abscissa(failed.case.at(at(factor)).system(()))
 
     factors = np.geomspace(1.0, _FASTEST, _STEPS + 1).tolist()
     for low, high in itertools.pairwise(factors):
@@ -167,7 +164,7 @@ def _stable_speed(failed: Design, analyze: Callable[..., Design]) -> Design | No
         # On the stable side of the boundary by a thousandth, if that is still stable.
         beyond = stable * (1.0 + 1e-3)
         chosen = beyond if beyond <= high and alpha(beyond) < 0.0 else high
-        result = analyze(_with_rig(failed, at(chosen), chosen), plant=failed.physics)
+        result = analyze(failed.case.at(_with_rig(failed, at(chosen), chosen)))
         return result if result.stable else None
     return None
 

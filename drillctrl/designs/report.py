@@ -94,9 +94,9 @@ def _gain_lines(design: Design) -> _Lines:
             for j, symbol in enumerate(outputs):
                 text = f"{float(gains[i, j])!r:>22} on {symbol}{when}, "
                 text += f"within [{low[i, j]:g}, {high[i, j]:g}]"
-                if design.rig_point is not None and structure.inputs == ("torque",):
-                    factors, names = gain_units(structure, design.rig_point)
-                    text += f"  = {gains[i, j] * factors[j]:.6g} {names[j]}"
+                if design.case.plant is not None and design.case.rig is not None:
+                    factors, names = gain_units(structure, design.case.plant, design.case.rig)
+                    text += f"  = {gains[i, j] * factors[i, j]:.6g} {names[i][j]}"
                 lines.append((name if j == 0 and i == 0 else "", text))
     return lines
 

@@ -24,8 +24,7 @@ from drillctrl.designs.loop_analysis import (
     discretised_radius,
 )
 from drillctrl.designs.margins import point_margins
-from drillctrl.drilling.case import Subject
-from drillctrl.drilling.plant import Plant
+from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin
 from drillctrl.robustness.radius import StabilityRadius, stability_radius
@@ -51,14 +50,10 @@ class Design:
 
     Attributes
     ----------
+    case : Case
+        What the gains are meant for: physics, point and rig as far as they are known.
     plant : DelaySystem
-        What the gains are meant for.
-    point : OperatingPoint or None
-        Where it drills, if it was given that way.
-    rig_point : RigPoint or None
-        The rig behind the point, if one was given.
-    physics : Plant or None
-        The equations behind the plant, if not those of `dimensionless_plant`.
+        Its linear system, with the inputs that are driven.
     structure : FeedbackStructure or None
         What is fed back; None for an open loop.
     K1, K2 : array, (m, p)
@@ -87,10 +82,8 @@ class Design:
         Finds `remedies` when they are asked for.
     """
 
+    case: Case
     plant: DelaySystem
-    point: OperatingPoint | None
-    rig_point: RigPoint | None
-    physics: Plant | None
     structure: FeedbackStructure | None
     K1: FloatArray
     K2: FloatArray
@@ -105,6 +98,16 @@ class Design:
     evaluations: int = 0
     elapsed_seconds: float = 0.0
     seek: Callable[[Design], tuple[Remedy, ...]] | None = None
+
+    @property
+    def point(self) -> OperatingPoint | None:
+        """Where it drills, if the physics is known."""
+        return self.case.point
+
+    @property
+    def rig_point(self) -> RigPoint | None:
+        """The rig at its point, if one was given."""
+        return self.case.rig_point
 
     @property
     def spectral_abscissa(self) -> float:
@@ -169,10 +172,10 @@ class Design:
 
     @functools.cached_property
     def point_margins(self) -> dict[str, ParameterMargin] | None:
-        """How wrong ψ, δ0 and ω0 may each be; None for an unstable loop or a user's plant."""
-        if not self.stable or self.point is None or self.structure is None:
+        """How wrong ψ, δ0 and ω0 may each be; None for an unstable loop or without a point."""
+        if not self.stable or not self.case.drills or self.structure is None:
             return None
-        return point_margins(self.point, self.structure, self.K1, self.K2, self.physics)
+        return point_margins(self.case, self.structure, self.K1, self.K2)
 
     @functools.cached_property
     def remedies(self) -> tuple[Remedy, ...]:
@@ -180,7 +183,7 @@ class Design:
         return () if self.seek is None else self.seek(self)
 
     def _perturbed(self) -> dict[str, DelaySystem]:
-        return perturbed_plants(self.plant, self.point, self.physics)
+        return perturbed_plants(self.plant, self.case)
 
     def robust_alternative(self, give_up: float = 0.05) -> Design:
         """Return gains that decay almost as fast here, and faster when something is off.
@@ -213,8 +216,7 @@ class Design:
             for plant in self._perturbed().values()
         ]
         gains = robust_alternative(family, perturbed, here, self.spectral_abscissa, share)
-        subject = Subject(self.plant, self.point, self.rig_point, self.physics)
-        result = assess(subject, self.structure, *self.structure.gains(gains))
+        result = assess(self.case, self.structure, *self.structure.gains(gains))
         return replace(result, elapsed_seconds=time.perf_counter() - began)
 
     def prove(self) -> Proof:
@@ -262,7 +264,7 @@ def closed_loop(
 
 
 def assess(
-    subject: Subject,
+    case: Case,
     feedback: FeedbackStructure | None,
     K1: FloatArray,
     K2: FloatArray,
@@ -270,7 +272,6 @@ def assess(
     order: int = DEFAULT_ORDER,
 ) -> Design:
     """Analyse the loop that the gains close, beside the open loop."""
-    plant = subject.plant
+    plant = case.system(None if feedback is None else feedback.inputs)
     loop = analyze_loop(closed_loop(plant, feedback, K1, K2))
-    where = subject.point, subject.rig_point, subject.physics
-    return Design(plant, *where, feedback, K1, K2, loop, m, order)
+    return Design(case, plant, feedback, K1, K2, loop, m, order)

@@ -10,10 +10,8 @@ from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.closing import close_loop, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.coefficients import PARAMETER_NAMES
-from drillctrl.drilling.linear import linearisation_sensitivity, parameter_vector, plant_system
-from drillctrl.drilling.plant import Plant, dimensionless_plant
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Where, as_case
+from drillctrl.drilling.linear import linearisation_sensitivity
 from drillctrl.spectrum.roots import Root, dominant_roots
 from drillctrl.spectrum.sensitivity import matrix_sensitivity
 
@@ -29,7 +27,8 @@ class RootSensitivity:
     K1, K2 : complex array, (m, p)
         Derivatives with respect to the gains; empty for an open loop.
     parameters : dict
-        Complex derivatives with respect to ω0, δ0, ψ, η, ξ, κ and n, by name.
+        Complex derivatives by the name of the parameter: the groups, each by itself, and those
+        of the plant's parts.
     """
 
     root: Root
@@ -39,35 +38,33 @@ class RootSensitivity:
 
 
 def root_sensitivity(
-    point: OperatingPoint,
+    point: Where,
     structure: FeedbackStructure | None = None,
     K1: FloatArray | None = None,
     K2: FloatArray | None = None,
     *,
     index: int = 0,
-    plant: Plant | None = None,
 ) -> RootSensitivity:
     """Differentiate a dominant root with respect to gains and operating point.
 
     Parameters
     ----------
-    point : OperatingPoint
-        Where the rig drills.
+    point : OperatingPoint, RigPoint or Case
+        What drills, and where.
     structure, K1, K2 : optional
         Feedback; without it the open loop.
     index : int
         Which of the `dominant_roots` of the loop; 0 is the one whose real part is α.
-    plant : Plant, optional
-        With the same parameters as `dimensionless_plant`, which is the default.
 
     Raises
     ------
     InputError
         If the root is multiple: it has no derivative there.
     """
-    plant = dimensionless_plant() if plant is None else plant
+    case = as_case(point)
+    plant, _ = case.physics("the derivative of a root")
     inputs = structure.inputs if structure else ("torque",)
-    open_loop = plant_system(point, inputs, plant)
+    open_loop = case.system(inputs)
     loop = open_loop
     if structure is not None:
         loop = close_loop(open_loop, structure, np.asarray(K1), K2)
@@ -84,10 +81,9 @@ def root_sensitivity(
         drive, measure = loop_channels(open_loop, structure)
         gains = [drive.T @ d @ measure.T for d in (d_a0, d_delayed[at])]
     # The CasADi Jacobian stacks A1, A2, B column by column, then τ0.
-    jacobian = linearisation_sensitivity(plant)(parameter_vector(point)).full()
+    jacobian = linearisation_sensitivity(plant)(case.parameter_vector).full()
     size = open_loop.order**2
     weights = np.concatenate([d_a0.ravel(order="F"), d_delayed[at].ravel(order="F")])
     slopes = weights @ jacobian[: 2 * size] + d_tau[at] * jacobian[-1]
-    names = [name for name in PARAMETER_NAMES if name not in ("lam", "beta")]
-    by_name = {name: complex(slopes[PARAMETER_NAMES.index(name)]) for name in names}
+    by_name = dict(zip(plant.parameter_names, map(complex, slopes), strict=True))
     return RootSensitivity(root, gains[0], gains[1], by_name)

@@ -1,1 +1,1 @@
-"""The drilling rig: its parameters, points, physics and feedback structures."""
+"""Drilling: rig, operating point, string, bit and rock, composed into a plant."""

@@ -1,13 +1,12 @@
-"""What the equations of motion multiply, and the names of parameters, states and inputs."""
+"""What the equations of motion multiply, from a rig (Eqs. 1, 3) or from groups (Eqs. 15, 16)."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-Expression = Any  # casadi.SX, or a float where every argument is one
-STATE_NAMES = ("x", "dx", "theta", "dtheta")
-INPUT_NAMES = ("axial", "torque")
-PARAMETER_NAMES = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "blades", "lam", "beta")
+Expression = Any  # casadi.SX, or a float or array where every argument is one
+
+GROUP_NAMES = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "blades", "lam", "beta")
 RIG_PARAMETER_NAMES = (
     "mass",
     "inertia",
@@ -71,7 +70,7 @@ def rig_coefficients(rig: Any) -> Coefficients:
 
 
 def dimensionless_coefficients(point: Any) -> Coefficients:
-    """Return the dimensionless coefficients (Eqs. 15, 16) from `PARAMETER_NAMES`."""
+    """Return the dimensionless coefficients (Eqs. 15, 16) from names as in `GROUP_NAMES`."""
     return Coefficients(
         mass=1.0,
         inertia=1.0,

@@ -1,4 +1,4 @@
-"""Gains in the units of a rig."""
+"""Gains in a rig's units: from what the outputs measure and the inputs do."""
 
 from __future__ import annotations
 
@@ -6,35 +6,40 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.point import RigPoint
+from drillctrl.drilling.plant import Plant
+from drillctrl.drilling.quantities import quotient_unit, si_scale
 from drillctrl.drilling.rig import Rig
 
 
-def gain_units(structure: FeedbackStructure, rig_point: RigPoint) -> tuple[FloatArray, list[str]]:
-    """Return the SI value of each unit gain of one row, and its unit.
+def gain_units(
+    structure: FeedbackStructure, plant: Plant, rig: Rig
+) -> tuple[FloatArray, list[list[str]]]:
+    """Return the SI value of each unit gain, (m, p), and its unit, by rows.
 
-    A torque is counted in Kt per rad, a rate in radians per time unit; an axial force in
-    the rig's axial force unit.
+    Parameters
+    ----------
+    structure : FeedbackStructure
+        Whose outputs and inputs are meant.
+    plant : Plant
+        Knows what they measure and do.
+    rig : Rig
+        Whose units.
     """
-    rig = rig_point.rig
     factors, names = [], []
-    for output in structure.outputs:
-        rate, axial = output.startswith("d"), output.endswith("x")
-        scale = rig.torsional_stiffness * (rig.time_scale if rate else 1.0)
-        factors.append(scale / (rig.axial_scale if axial else 1.0))
-        names.append(f"N·m{'·s' if rate else ''}/{'m' if axial else 'rad'}")
+    for driven in structure.inputs:
+        effort = plant.quantity(driven)
+        outputs = [plant.quantity(output) for output in structure.outputs]
+        factors.append([si_scale(effort, rig) / si_scale(output, rig) for output in outputs])
+        names.append([quotient_unit(effort, output) for output in outputs])
     return np.array(factors), names
 
 
-def rig_gain_units(structure: FeedbackStructure, rig: Rig | None) -> list[tuple[float, str]] | None:
-    """Return factor and SI unit of each entry of (K1, K2); None without rig units for them."""
-    if rig is None or structure.inputs != ("torque",):
+def rig_gain_units(
+    structure: FeedbackStructure, plant: Plant, rig: Rig | None
+) -> list[tuple[float, str]] | None:
+    """Return factor and SI unit of each entry of (K1, K2), flat; None without a rig."""
+    if rig is None:
         return None
-    if not set(structure.outputs) <= {"theta", "dtheta"}:
-        return None
-    # θ is in radians already; θ' is per unit of time, u in units of Kt.
-    known = {
-        "theta": (rig.torsional_stiffness, "N*m/rad"),
-        "dtheta": (rig.torsional_stiffness * rig.time_scale, "N*m*s/rad"),
-    }
-    return [known[output] for output in structure.outputs] * 2
+    factors, names = gain_units(structure, plant, rig)
+    flat = zip(factors.ravel().tolist(), [n for row in names for n in row], strict=True)
+    return [(factor, name.replace("·", "*")) for factor, name in flat] * 2

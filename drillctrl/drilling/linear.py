@@ -1,125 +1,173 @@
-"""The linear delayed plant: the physics differentiated about steady drilling."""
+"""The linear delayed plant (Eqs. 22-26), derived from the plant's expressions."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError
-from drillctrl.delay.system import DelaySystem
-from drillctrl.drilling.bit_rock import kinematics
-from drillctrl.drilling.coefficients import PARAMETER_NAMES, STATE_NAMES, dimensionless_coefficients
-from drillctrl.drilling.plant import Plant, dimensionless_plant, named
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.bit_rock import (
+    Contact,
+    Rates,
+    kinematics,
+    steady_delay,
+    steady_depth,
+    steady_load,
+    switched,
+)
+from drillctrl.drilling.plant import Plant, by_form, expressions
+
+BIT_STATES = 4
 
 
-@functools.cache
-def linearisation(plant: Plant) -> ca.Function:
-    """Linearise a plant about its steady state: p → A1, A2, B, τ0 (Eqs. 22, 23, 25, 26).
+@by_form
+def linear_bit(plant: Plant) -> ca.Function:
+    """Linearise depth of cut and load about steady drilling: p → c1, c2, Jd, Jr, d0.
 
+    Returns
+    -------
+    Function
+        c1, c2 (1, 4): rows of the depth of cut d0 + c1 Xb + c2 Xb(t − τ0) of the bit's four
+        states (Eqs. 17, 19); Jd (2, 1), Jr (2, 2): derivatives of the load by the depth and
+        by Z', Φ'; d0.
+
+    Notes
+    -----
     The state-dependent delay is removed by the implicit function theorem: with g the
-    delay condition, δτ = −(g_X δX + g_Xd δXd)/g_τ. The delayed state is at rest in the
-    steady state, so τ moves the motion through the right-hand side alone.
+    condition on the delay, δτ = −(g_X δX + g_Xd δXd)/g_τ.
     """
-    to_steady = [
-        (plant.state, ca.SX.zeros(plant.state.shape)),
-        (plant.delayed_state, ca.SX.zeros(plant.state.shape)),
-        (plant.inputs, ca.SX.zeros(plant.inputs.shape)),
-        (plant.delay, plant.steady_delay),
-    ]
+    form = expressions(plant)
+    now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
+    delay, depth, rates = ca.SX.sym("delay"), ca.SX.sym("depth"), ca.SX.sym("rates", 2)
+    bit = kinematics(form.c, ca.vertsplit(now), ca.vertsplit(then), delay)
 
-    def total(variable: ca.SX) -> ca.SX:
-        f, g = plant.rhs, plant.delay_condition
-        dtau = -ca.jacobian(g, variable) / ca.jacobian(g, plant.delay)
-        return ca.densify(ca.jacobian(f, variable) + ca.jacobian(f, plant.delay) @ dtau)
-
-    outputs = [total(plant.state), total(plant.delayed_state), total(plant.inputs)]
-    for symbol, value in to_steady:
-        outputs = ca.substitute(outputs, [symbol], [value])
-    return ca.Function(
-        "linearisation",
-        [plant.parameters],
-        [*outputs, plant.steady_delay],
-        ["parameters"],
-        ["A1", "A2", "B", "tau0"],
-    )
-
-
-@functools.cache
-def linear_depth() -> ca.Function:
-    """Return p → rows c1, c2 of the linear depth of cut 2πδ0 + c1 X + c2 Xd (Eqs. 17, 19)."""
-    parameters, point = named(PARAMETER_NAMES)
-    state, now = named(STATE_NAMES)
-    delayed_state, then = named(STATE_NAMES)
-    delay = ca.SX.sym("tau")
-    c = dimensionless_coefficients(point)
-    bit = kinematics(c, now, then, delay)
-
-    def total(variable: ca.SX) -> ca.SX:
+    def row(variable: ca.SX) -> ca.SX:
         dtau = -ca.jacobian(bit.turned, variable) / ca.jacobian(bit.turned, delay)
-        return ca.jacobian(bit.depth, variable) + ca.jacobian(bit.depth, delay) @ dtau
+        return ca.densify(ca.jacobian(bit.depth, variable) + ca.jacobian(bit.depth, delay) @ dtau)
 
-    rows = ca.densify(ca.vertcat(total(state), total(delayed_state)))
-    return ca.Function("linear_depth", [parameters], [rows])
+    # Cutting goes on, the flat is pressed and rubs: the branch that steady drilling is on.
+    contact = Contact(depth, 1.0, 1.0)
+    load = ca.vertcat(*form.bit.load(form.c, contact, Rates(*ca.vertsplit(rates)), form.q))
+    slopes = [ca.densify(ca.jacobian(load, variable)) for variable in (depth, rates)]
+    steady = (
+        (depth, steady_depth(form.c)),
+        (rates, ca.vertcat(form.c.penetration_rate, form.c.rotary_speed)),
+    )
+    for symbol, value in steady:
+        slopes = ca.substitute(slopes, [symbol], [value])
+    outputs = [row(now), row(then), *slopes, steady_depth(form.c)]
+    names = ["c1", "c2", "Jd", "Jr", "d0"]
+    return ca.Function("linear_bit", [form.parameters], outputs, ["p"], names)
 
 
-@functools.cache
+@by_form
+def linearisation(plant: Plant) -> ca.Function:
+    """Linearise a plant about steady drilling (Eqs. 22, 23, 25, 26).
+
+    Returns
+    -------
+    Function
+        p → A0 (n, n), L (n, 1), R (1, n), B (n, m), C (q, n), τ0 and, for every late term, its
+        delay and matrix: X' = A0 X + L R X(t − τ0) + B u + …, Y = C X. The bit meets its own
+        past in one signal, the depth of cut, so that the delayed matrix has rank one.
+    """
+    form = expressions(plant)
+    structure = form.structure
+    c1, c2, jd, jr, _ = linear_bit(plant)(form.parameters)
+    n = structure.A.shape[0]
+    pick = ca.SX.eye(n)[:BIT_STATES, :]
+    feels = jd @ c1
+    feels[:, 1] = feels[:, 1] + jr[:, 0]
+    feels[:, 3] = feels[:, 3] + jr[:, 1]
+    outputs = [
+        ca.densify(structure.A + structure.E @ feels @ pick),
+        ca.densify(structure.E @ jd),
+        ca.densify(c2 @ pick),
+        ca.densify(structure.B),
+        ca.densify(structure.C),
+        steady_delay(form.c),
+    ]
+    for late in structure.late:
+        outputs += [late.delay, ca.densify(late.matrix)]
+    return ca.Function("linearisation", [form.parameters], outputs)
+
+
+@by_form
 def linearisation_sensitivity(plant: Plant) -> ca.Function:
-    """Return p → ∂(vec A1, vec A2, vec B, τ0)/∂p, stacked by rows, columns as in p."""
-    linear = linearisation(plant)
-    stacked = ca.vertcat(*[ca.vec(value) for value in linear(plant.parameters)])
+    """Return p → ∂(vec A0, vec L R, vec B, τ0)/∂p, stacked by rows, columns as in p."""
+    form = expressions(plant)
+    a0, left, right, b, _, tau, *_ = linearisation(plant)(form.parameters)
+    stacked = ca.vertcat(ca.vec(a0), ca.vec(left @ right), ca.vec(b), tau)
     return ca.Function(
         "sensitivity",
-        [plant.parameters],
-        [ca.densify(ca.jacobian(stacked, plant.parameters))],
+        [form.parameters],
+        [ca.densify(ca.jacobian(stacked, form.parameters))],
         ["parameters"],
         ["jacobian"],
     )
 
 
-def parameter_vector(point: OperatingPoint) -> FloatArray:
-    """Return the groups of a point in the order of `PARAMETER_NAMES`, shape (9,)."""
-    return np.array([getattr(point, name) for name in PARAMETER_NAMES], dtype=float)
+class LinearArrays(NamedTuple):
+    """Linear plants of one form at N sets of parameters.
 
-
-def plant_system(
-    point: OperatingPoint,
-    inputs: Sequence[str] = ("torque",),
-    plant: Plant | None = None,
-) -> DelaySystem:
-    """Return the linear delayed plant at an operating point (Eqs. 23, 25, 26, 34, 35).
-
-    Parameters
+    Attributes
     ----------
-    point : OperatingPoint
-        Its groups are the plant's parameters.
-    inputs : sequence of str
-        Which of the plant's inputs are driven: ``"torque"`` (the paper's u), ``"axial"``.
-    plant : Plant, optional
-        A plant with the same parameters as `dimensionless_plant`, which is the default.
-
-    Returns
-    -------
-    DelaySystem
-        All states are outputs.
+    A0 : array, (N, n, n)
+    left, right : array, (N, n, 1) and (N, 1, n)
+        Factors of the delayed matrix.
+    B, C : array, (N, n, m) and (N, q, n)
+    delay : array, (N,)
+        τ0.
+    late : tuple of (delay (N,), matrix (N, n, n))
+        Further delayed terms.
     """
-    plant = dimensionless_plant() if plant is None else plant
-    for name in inputs:
-        if name not in plant.input_names:
-            raise InputError("inputs", name, f"among {', '.join(plant.input_names)}")
-    a1, a2, b, tau0 = (value.full() for value in linearisation(plant)(parameter_vector(point)))
-    driven = [plant.input_names.index(name) for name in inputs]
-    return DelaySystem(
-        a1,
-        (a2,),
-        (float(tau0[0, 0]),),
-        b[:, driven],
-        np.eye(a1.shape[0]),
-        state_names=plant.state_names,
-        input_names=tuple(inputs),
-        output_names=plant.state_names,
+
+    A0: FloatArray
+    left: FloatArray
+    right: FloatArray
+    B: FloatArray
+    C: FloatArray
+    delay: FloatArray
+    late: tuple[tuple[FloatArray, FloatArray], ...]
+
+
+def linear_arrays(plant: Plant, table: FloatArray) -> LinearArrays:
+    """Return the linear plants at rows of parameters, (N, k)."""
+    count = table.shape[0]
+    function = linearisation(plant)
+    mapped = function if count == 1 else function.map(count)
+    values = []
+    for i, value in enumerate(mapped(table.T)):
+        rows, columns = function.size_out(i)
+        full = value.full().reshape(rows, count, columns)
+        values.append(np.ascontiguousarray(full.transpose(1, 0, 2)))
+    late = tuple((values[i].reshape(count), values[i + 1]) for i in range(6, len(values), 2))
+    a0, left, right, b, c, tau = values[:6]
+    return LinearArrays(a0, left, right, b, c, tau.reshape(count), late)
+
+
+@by_form
+def rhs_function(plant: Plant) -> ca.Function:
+    """Return the nonlinear motion (X, Xd, τ, u, p) → X', with switches as in Eqs. 4-6.
+
+    Signals that arrive late are not in it.
+    """
+    form = expressions(plant)
+    structure = form.structure
+    n, m = structure.B.shape
+    state, then, inputs = ca.SX.sym("X", n), ca.SX.sym("Xd", n), ca.SX.sym("u", m)
+    delay = ca.SX.sym("tau")
+    bit = kinematics(form.c, ca.vertsplit(state), ca.vertsplit(then), delay)
+    load = form.bit.load(form.c, switched(bit.depth, bit.rates), bit.rates, form.q)
+    steady = steady_load(form.bit, form.c, form.q)
+    excess = ca.vertcat(*[a - b for a, b in zip(load, steady, strict=True)])
+    rhs = structure.A @ state + structure.E @ excess + structure.B @ inputs
+    return ca.Function(
+        "rhs",
+        [state, then, delay, inputs, form.parameters],
+        [ca.densify(rhs)],
+        ["state", "delayed_state", "delay", "inputs", "parameters"],
+        ["rhs"],
     )

@@ -1,188 +1,275 @@
-"""The physics, written once as CasADi expressions (Eqs. 1-9, 14-21, 33).
-
-`bit_rock` and `equations_of_motion` hold the whole model. The dimensional plant, the
-dimensionless plant, the steady state and the linear delayed plant all come from them by
-substitution and differentiation.
-"""
+"""The plant: a string, its blocks and a bit–rock law, composed as CasADi expressions."""
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any, TypeVar
 
 import casadi as ca
-import numpy as np
 
-from drillctrl.drilling.bit_rock import BitRock, Contact, bit_rock, contact_load, kinematics
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.bit_rock import BitRock, PaperLaw
+from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import (
-    INPUT_NAMES,
-    PARAMETER_NAMES,
+    GROUP_NAMES,
     RIG_PARAMETER_NAMES,
-    STATE_NAMES,
     Coefficients,
-    Expression,
     dimensionless_coefficients,
     rig_coefficients,
 )
-from drillctrl.drilling.steady import steady_delay, steady_load, steady_offsets
-from drillctrl.drilling.string import equations_of_motion
+from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.part import Part
+from drillctrl.drilling.realisation import Realisation, realise
+from drillctrl.drilling.string import LumpedString, String, StringFunction, StringModel
+
+R = TypeVar("R")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Plant:
-    """A nonlinear plant with one state-dependent delay, as CasADi SX expressions.
+    """What drills: a linear structure with a bit in the rock.
 
-    The motion is X' = ``rhs``, a function of X, Xd, τ, u and p, where Xd = X(t − τ) and τ
-    solves ``delay_condition`` = 0. All are perturbations of the steady state X = 0, u = 0,
-    τ = ``steady_delay``. A user's plant is `dataclasses.replace` of another with some
-    expressions rewritten.
+    Plants with equal parts are equal; those of one form share what is derived for them.
 
     Attributes
     ----------
-    state, delayed_state : SX, (n, 1)
-        X and Xd.
-    delay : SX
-        τ.
-    inputs : SX, (m, 1)
-        u.
+    bit : BitRock
+        The bit–rock law.
+    string : StringModel
+        What hangs between top end and bit.
+    blocks : tuple of Block
+        Drives, sensors and actuators, in the order in which they are composed.
+    group_names : tuple of str
+        Parameters that `coefficients` takes.
+    coefficients : callable
+        From a record of these to `Coefficients`.
+
+    Raises
+    ------
+    InputError
+        If a parameter's name is used twice.
+    """
+
+    bit: BitRock
+    string: StringModel
+    blocks: tuple[Block, ...] = ()
+    group_names: tuple[str, ...] = GROUP_NAMES
+    coefficients: Callable[[Any], Coefficients] = dimensionless_coefficients
+
+    def __post_init__(self) -> None:
+        names = self.parameter_names
+        twice = [name for i, name in enumerate(names) if name in names[:i]]
+        if twice:
+            raise InputError("parameter", twice[0], "a name that is used once in a plant")
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Law, string and blocks."""
+        return (self.bit, self.string, *self.blocks)
+
+    @property
+    def own(self) -> dict[str, float]:
+        """Parameters of the parts, by name."""
+        return {name: value for part in self.parts for name, value in part.values.items()}
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """All parameters: the groups, then those of the parts."""
+        return (*self.group_names, *(name for part in self.parts for name in part.values))
+
+    @property
+    def form(self) -> Hashable:
+        """What the plant is apart from the values of its parts."""
+        return (tuple(part.form for part in self.parts), self.group_names, self.coefficients)
+
+    def with_values(self, **changes: float) -> Plant:
+        """Return the plant with other values of its parts' parameters.
+
+        Raises
+        ------
+        InputError
+            If no part has such a parameter.
+        """
+        for name in changes:
+            if name not in self.own:
+                known = ", ".join(self.own) or "none: its parts have no parameters"
+                raise InputError("parameter", name, f"one of {known}")
+
+        def changed(part: Any) -> Any:
+            mine = {name: value for name, value in changes.items() if name in part.values}
+            return part.with_values(**mine) if mine else part
+
+        return replace(
+            self,
+            bit=changed(self.bit),
+            string=changed(self.string),
+            blocks=tuple(changed(block) for block in self.blocks),
+        )
+
+    @property
+    def linear(self) -> Realisation:
+        """The linear structure, as expressions in the parameters."""
+        return expressions(self).structure
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states; the bit's x, dx, theta and dtheta come first."""
+        return self.linear.state_names
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.linear.input_names
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs; all states are among them."""
+        return self.linear.output_names
+
+    def quantity(self, name: str) -> str:
+        """Return what an input or an output measures, a key of `SI_UNITS`.
+
+        Raises
+        ------
+        InputError
+            If there is no such signal.
+        """
+        known = {signal.name: signal.quantity for signal in
+                 (*self.linear.outputs, *self.linear.inputs)}  # fmt: skip
+        if name not in known:
+            raise InputError("signal", name, f"one of {', '.join(known)}")
+        return known[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Expressions:
+    """A plant's form in symbols.
+
+    Attributes
+    ----------
     parameters : SX, (k, 1)
-        p.
-    rhs : SX, (n, 1)
-        The right-hand side.
-    delay_condition : SX
-        Zero at the true τ.
-    steady_delay : SX
-        τ0 as a function of p.
-    state_names, input_names, parameter_names : tuple of str
-        Names in order.
+        All parameters, in the order of `Plant.parameter_names`.
+    c : Coefficients
+        From the groups.
+    q : record
+        The law's own parameters by name.
+    bit : BitRock
+        The law.
+    structure : Realisation
+        The linear structure.
     """
 
-    state: ca.SX
-    delayed_state: ca.SX
-    delay: ca.SX
-    inputs: ca.SX
     parameters: ca.SX
-    rhs: ca.SX
-    delay_condition: ca.SX
-    steady_delay: ca.SX
-    state_names: tuple[str, ...]
-    input_names: tuple[str, ...]
-    parameter_names: tuple[str, ...]
+    c: Coefficients
+    q: Any
+    bit: BitRock
+    structure: Realisation
 
 
-def named(names: tuple[str, ...]) -> tuple[ca.SX, Any]:
-    """Return a vector of symbols and a record that holds them by name."""
-    vector = ca.vertcat(*[ca.SX.sym(name) for name in names])
-    record = NamedTuple("record", [(name, Any) for name in names])  # type: ignore[misc]
-    return vector, record(*ca.vertsplit(vector))
+@dataclass(frozen=True)
+class _Form:
+    """A key that carries a plant of that form."""
+
+    key: Hashable
+    plant: Plant = field(compare=False)
 
 
-def _perturbed_motion(
-    c: Coefficients, now: Any, u: Any, load: BitRock, top: Any = None
-) -> tuple[Expression, Expression]:
-    """Return x'' and θ'': what the steady state balances is taken off both sides.
+def by_form(function: Callable[[Plant], R]) -> Callable[[Plant], R]:
+    """Remember what a function says of a plant for all plants of its form."""
 
-    ``top`` is what the top end has moved beyond V0 t and Ω0 t, by name (x, theta).
+    @functools.lru_cache(maxsize=256)
+    def remembered(form: _Form) -> R:
+        return function(form.plant)
+
+    @functools.wraps(function)
+    def wrapped(plant: Plant) -> R:
+        return remembered(_Form(plant.form, plant))
+
+    return wrapped
+
+
+@by_form
+def expressions(plant: Plant) -> Expressions:
+    """Return the plant in symbols."""
+    symbols = {name: ca.SX.sym(name) for name in plant.parameter_names}
+    c = plant.coefficients(SimpleNamespace(**{n: symbols[n] for n in plant.group_names}))
+
+    def record(part: Part) -> Any:
+        return SimpleNamespace(**{name: symbols[name] for name in part.values})
+
+    string = plant.string.build(c, record(plant.string))
+    for block in plant.blocks:
+        string = block.mechanics(string, c, record(block))
+    structure = realise(string)
+    for block in plant.blocks:
+        structure = block.signals(structure, c, record(block))
+    vector = ca.vertcat(*symbols.values())
+    return Expressions(vector, c, record(plant.bit), plant.bit, structure)
+
+
+def paper_plant(
+    bit: BitRock | None = None,
+    string: StringModel | Callable[[Coefficients], String] | None = None,
+    blocks: tuple[Block, ...] = (),
+) -> Plant:
+    """Return the dimensionless plant of the paper, or one with some of its parts replaced.
+
+    Parameters
+    ----------
+    bit : BitRock, optional
+        Another bit–rock law.
+    string : StringModel or function from Coefficients to String, optional
+        Another string.
+    blocks : tuple of Block
+        Drive, sensors and actuators.
+
+    Raises
+    ------
+    InputError
+        If a part is of another kind.
     """
-    excess = BitRock(*(a - b for a, b in zip(load, steady_load(c), strict=True)))
-    stretch = now.x if top is None else now.x - top.x
-    twist = now.theta if top is None else now.theta - top.theta
-    return equations_of_motion(
-        c._replace(weight=0.0), stretch, twist, now.dx, now.dtheta, excess, u.axial, u.torque
-    )
+    law = PaperLaw() if bit is None else bit
+    if string is None:
+        string = LumpedString()
+    elif callable(string) and not isinstance(string, StringModel):
+        string = StringFunction(string)
+    blocks = (blocks,) if isinstance(blocks, Block) else tuple(blocks)
+    for name, part, kind in (
+        ("bit", law, BitRock),
+        ("string", string, StringModel),
+        *(("blocks", block, Block) for block in blocks),
+    ):
+        if not isinstance(part, kind):
+            raise InputError(name, type(part).__name__, f"a {kind.__name__}")
+    return Plant(law, string, blocks)
 
 
-def _plant(c: Coefficients, parameters: ca.SX, parameter_names: tuple[str, ...]) -> Plant:
-    state, now = named(STATE_NAMES)
-    delayed_state, then = named(STATE_NAMES)
-    inputs, u = named(INPUT_NAMES)
-    delay = ca.SX.sym("tau")
-    bit = kinematics(c, now, then, delay)
-    load = bit_rock(c, bit.depth, bit.axial_rate, bit.rotary_rate)
-    axial, angular = _perturbed_motion(c, now, u, load)
-    return Plant(
-        state=state,
-        delayed_state=delayed_state,
-        delay=delay,
-        inputs=inputs,
-        parameters=parameters,
-        rhs=ca.vertcat(now.dx, axial, now.dtheta, angular),
-        delay_condition=bit.turned - 2 * np.pi / c.blades,
-        steady_delay=steady_delay(c),
-        state_names=STATE_NAMES,
-        input_names=INPUT_NAMES,
-        parameter_names=parameter_names,
-    )
+def rig_plant() -> Plant:
+    """Return the paper's plant in SI, parameters in the order of `RIG_PARAMETER_NAMES`."""
+    return Plant(PaperLaw(), LumpedString(), (), RIG_PARAMETER_NAMES, rig_coefficients)
 
 
-@functools.cache
-def branch_functions() -> tuple[ca.Function, ...]:
-    """Return the dimensionless model on one branch of its switches, for event-driven use.
+def top_drive_plant(inertia_ratio: float) -> Plant:
+    """Return the dimensionless plant with a top drive.
+
+    Parameters
+    ----------
+    inertia_ratio : float
+        J > 0, inertia of the drive, referred to the string, over that at the bit.
 
     Returns
     -------
-    acceleration : Function
-        (X, u, top, contact, p) → (x'', θ''), with ``top`` the motion of the top end beyond
-        V0 t and Ω0 t, (x, θ), and ``contact`` a `Contact`.
-    load : Function
-        (contact, p) → weight and torque on bit.
-    depth, turned : Function
-        (X, Xd, τ, p) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8).
-    rates : Function
-        (X, p) → Z', Φ'.
-    rest : Function
-        p → x and θ of an unloaded bit at rest while the top end is at V0 t and Ω0 t.
+    Plant
+        States x, dx, theta, dtheta, phi, dphi; inputs axial, torque and ``drive``, the
+        perturbation of the drive's torque in units of Kt:
+        θ'' gains the term φ, and J φ'' = θ − φ + drive.
+
+    Raises
+    ------
+    InputError
+        If the ratio is not positive.
     """
-    parameters, point = named(PARAMETER_NAMES)
-    state, now = named(STATE_NAMES)
-    delayed_state, then = named(STATE_NAMES)
-    inputs, u = named(INPUT_NAMES)
-    top_vector, top = named(("x", "theta"))
-    contact_vector, record = named(Contact._fields)
-    delay = ca.SX.sym("tau")
-    c = dimensionless_coefficients(point)
-    bit = kinematics(c, now, then, delay)
-    load = contact_load(c, Contact(*record))
-    motion = _perturbed_motion(c, now, u, load, top)
-    angle = bit.turned - 2 * np.pi / c.blades
-    offsets = steady_offsets(c)
-    arguments = [state, delayed_state, delay, parameters]
-    return (
-        ca.Function(
-            "acceleration",
-            [state, inputs, top_vector, contact_vector, parameters],
-            [ca.vertcat(*motion)],
-        ),
-        ca.Function("load", [contact_vector, parameters], [ca.vertcat(*load)]),
-        ca.Function("depth", arguments, [bit.depth]),
-        ca.Function("turned", arguments, [angle]),
-        ca.Function("rates", [state, parameters], [ca.vertcat(bit.axial_rate, bit.rotary_rate)]),
-        ca.Function("rest", [parameters], [ca.vertcat(-offsets[0], -offsets[1])]),
-    )
-
-
-@functools.cache
-def dimensionless_plant() -> Plant:
-    """Return the dimensionless plant, parameters in the order of `PARAMETER_NAMES`."""
-    vector, point = named(PARAMETER_NAMES)
-    return _plant(dimensionless_coefficients(point), vector, PARAMETER_NAMES)
-
-
-@functools.cache
-def dimensional_plant() -> Plant:
-    """Return the plant in SI, parameters in the order of `RIG_PARAMETER_NAMES`."""
-    vector, rig = named(RIG_PARAMETER_NAMES)
-    return _plant(rig_coefficients(rig), vector, RIG_PARAMETER_NAMES)
-
-
-@functools.cache
-def rhs_function(plant: Plant) -> ca.Function:
-    """Return the CasADi function (X, Xd, τ, u, p) → X'."""
-    return ca.Function(
-        "rhs",
-        [plant.state, plant.delayed_state, plant.delay, plant.inputs, plant.parameters],
-        [plant.rhs],
-        ["state", "delayed_state", "delay", "inputs", "parameters"],
-        ["rhs"],
-    )
+    return paper_plant(blocks=(TopDrive(inertia_ratio=inertia_ratio),))

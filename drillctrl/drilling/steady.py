@@ -6,18 +6,17 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.base.errors import InputError, checked_number, interval_text
-from drillctrl.drilling.bit_rock import BitRock, bit_rock
+from drillctrl.drilling.bit_rock import PaperLaw, steady_delay, steady_depth, steady_load
 from drillctrl.drilling.coefficients import (
     RIG_PARAMETER_NAMES,
     Coefficients,
-    Expression,
     rig_coefficients,
 )
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.drilling.string import equations_of_motion
 
 
 @dataclass(frozen=True)
@@ -63,16 +62,29 @@ def _coefficients(point: RigPoint) -> Coefficients:
 def steady_state(point: RigPoint) -> SteadyState:
     """Return loads, deformations and depth of cut of steady drilling (Eqs. 10-12)."""
     c = _coefficients(point)
-    load = steady_load(c)
-    axial_offset, angular_offset = steady_offsets(c)
+    weight, torque = (float(value) for value in steady_load(PaperLaw(), c, None))
     return SteadyState(
-        weight_on_bit=float(load.weight_on_bit),
-        torque_on_bit=float(load.torque_on_bit),
+        weight_on_bit=weight,
+        torque_on_bit=torque,
         depth_of_cut=float(steady_depth(c)),
-        axial_offset=float(axial_offset),
-        angular_offset=float(angular_offset),
+        axial_offset=(c.weight - weight - c.axial_damping * c.penetration_rate) / c.axial_stiffness,
+        angular_offset=-(torque + c.torsional_damping * c.rotary_speed) / c.torsional_stiffness,
         delay=float(steady_delay(c)),
     )
+
+
+def weight_on_bit(
+    rig: Rig, rotary_speed: npt.ArrayLike, penetration_rate: npt.ArrayLike, strength: npt.ArrayLike
+) -> npt.NDArray[np.float64]:
+    """Return the steady weight on bit, N, at many speeds, rates and rocks (SI)."""
+    values = {
+        **rig_parameter_values(RigPoint(rig, 1.0, 0.0)),
+        "rotary_speed": np.asarray(rotary_speed, dtype=float),
+        "penetration_rate": np.asarray(penetration_rate, dtype=float),
+        "rock_strength": np.asarray(strength, dtype=float),
+    }
+    load = steady_load(PaperLaw(), rig_coefficients(SimpleNamespace(**values)), None)
+    return np.asarray(load.weight_on_bit, dtype=float)
 
 
 def rig_point_at_weight_on_bit(rig: Rig, rotary_speed: float, weight_on_bit: float) -> RigPoint:
@@ -102,26 +114,3 @@ def rig_point_at_weight_on_bit(rig: Rig, rotary_speed: float, weight_on_bit: flo
         limits = interval_text(idle)
         raise InputError("weight_on_bit", wanted, f"{limits} N (the wear flat carries {idle:g} N)")
     return RigPoint(rig, rotary_speed, (wanted - idle) / (unit - idle))
-
-
-def steady_depth(c: Coefficients) -> Expression:
-    """d0 = 2π V0/Ω0, total depth of cut per revolution in steady drilling (Eq. 11)."""
-    return 2 * np.pi * (c.penetration_rate / c.rotary_speed)
-
-
-def steady_delay(c: Coefficients) -> Expression:
-    """2π/(n Ω0), the delay of steady drilling (Eq. 18)."""
-    return 2 * np.pi / (c.blades * c.rotary_speed)
-
-
-def steady_load(c: Coefficients) -> BitRock:
-    """Weight on bit and torque on bit in steady drilling (Eqs. 2, 3, 10, 11)."""
-    return bit_rock(c, steady_depth(c), c.penetration_rate, c.rotary_speed)
-
-
-def steady_offsets(c: Coefficients) -> tuple[Expression, Expression]:
-    """z0 and φ0 of Eq. 12: the stretch and twist at which nothing accelerates."""
-    axial, angular = equations_of_motion(
-        c, 0.0, 0.0, c.penetration_rate, c.rotary_speed, steady_load(c), 0.0, 0.0
-    )
-    return axial * c.mass / c.axial_stiffness, angular * c.inertia / c.torsional_stiffness

@@ -1,39 +1,151 @@
-"""The string between top end and bit (Eq. 1)."""
+"""The drill string as a linear structure M q'' + C q' + K q = f with two ports, bit and top.
+
+The first two coordinates are the bit's, x and θ; the last two the top end's. All are
+perturbations of steady drilling, so that damping, which acts on the velocity itself, is that
+of the perturbation.
+"""
 
 from __future__ import annotations
 
-from drillctrl.drilling.bit_rock import BitRock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+from drillctrl.base.errors import InputError
 from drillctrl.drilling.coefficients import Coefficients, Expression
+from drillctrl.drilling.part import Part
+from drillctrl.drilling.quantities import RATES, checked_quantity
+
+BIT = ("x", "theta")
+TOP = ("x_top", "theta_top")
 
 
-def equations_of_motion(
-    c: Coefficients,
-    stretch: Expression,
-    twist: Expression,
-    axial_rate: Expression,
-    rotary_rate: Expression,
-    load: BitRock,
-    axial_force: Expression,
-    torque: Expression,
-) -> tuple[Expression, Expression]:
-    """Return the axial and the angular acceleration of the bit (Eq. 1, with actuators).
+@dataclass(frozen=True, eq=False)
+class String:
+    """A linear structure seen from its two ports.
 
-    Parameters
+    Attributes
     ----------
-    c : Coefficients
-        Inertia, damping, stiffness and weight.
-    stretch, twist : expression
-        z − V0 t and φ − Ω0 t.
-    axial_rate, rotary_rate : expression
-        Velocities of the bit.
-    load : BitRock
-        Weight on bit and torque on bit.
-    axial_force, torque : expression
-        Actuator force and torque on the bit.
+    coordinates : mapping
+        Name → ``"length"`` or ``"angle"``, N of them: ``x`` and ``theta`` of the bit first,
+        ``x_top`` and ``theta_top`` last.
+    mass, damping, stiffness : (N, N)
+        M, C and K, as nested lists, arrays or CasADi matrices. The top end has no mass as
+        long as its motion is imposed.
+    inputs : mapping
+        Name → coordinate on which that force or torque acts.
+    outputs : mapping
+        Name → (quantity, {state: factor}): what is measured beside the states.
+    imposed : tuple of str
+        Coordinates whose motion is imposed; a drive takes the top end's out.
+    reference : mapping
+        Coordinate → top coordinate whose imposed motion is taken off when it is measured;
+        by default ``x_top`` for lengths, ``theta_top`` for angles; None for none.
+
+    Raises
+    ------
+    InputError
+        If shapes, names or quantities do not fit.
     """
-    axial = c.weight - load.weight_on_bit - c.axial_damping * axial_rate
-    angular = -load.torque_on_bit - c.torsional_damping * rotary_rate
-    return (
-        (axial - c.axial_stiffness * stretch + axial_force) / c.mass,
-        (angular - c.torsional_stiffness * twist + torque) / c.inertia,
-    )
+
+    coordinates: Mapping[str, str]
+    mass: Any
+    damping: Any
+    stiffness: Any
+    inputs: Mapping[str, str] = field(default_factory=lambda: {"axial": "x", "torque": "theta"})
+    outputs: Mapping[str, tuple[str, Mapping[str, Expression]]] = field(default_factory=dict)
+    imposed: tuple[str, ...] = TOP
+    reference: Mapping[str, str | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = tuple(self.coordinates)
+        if names[:2] != BIT or (self.imposed == TOP and names[-2:] != TOP):
+            wanted = "x and theta first, x_top and theta_top last"
+            raise InputError("coordinates", ", ".join(names), wanted)
+        for name, quantity in self.coordinates.items():
+            if quantity not in RATES:
+                raise InputError(f"quantity of {name}", quantity, f"one of {', '.join(RATES)}")
+        size = len(names)
+        for name in ("mass", "damping", "stiffness"):
+            matrix = as_matrix(name, getattr(self, name))
+            if matrix.shape != (size, size):
+                wanted = f"of shape ({size}, {size})"
+                raise InputError(name, f"matrix of shape {matrix.shape}", wanted)
+            object.__setattr__(self, name, matrix)
+        for name, coordinate in self.inputs.items():
+            if coordinate not in names:
+                raise InputError(f"input {name}", coordinate, f"one of {', '.join(names)}")
+        for name, (quantity, _) in self.outputs.items():
+            checked_quantity(name, quantity)
+
+
+def as_matrix(name: str, given: Any) -> ca.SX:
+    """Return a matrix of numbers and expressions as SX.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if isinstance(given, ca.SX):
+        return given
+    if isinstance(given, ca.DM):
+        return ca.SX(given)
+    try:
+        # Entry by entry: NumPy would turn symbols into NaN without a word.
+        rows = [[ca.SX(entry) for entry in row] for row in given]
+        return ca.sparsify(ca.vertcat(*[ca.horzcat(*row) for row in rows]))
+    except (TypeError, NotImplementedError, RuntimeError):
+        raise InputError(name, type(given).__name__, "a matrix of numbers") from None
+
+
+class StringModel(Part):
+    """Makes a string from the coefficients and its own parameters."""
+
+    def build(self, c: Coefficients, q: Any) -> String:
+        """Return the string.
+
+        Parameters
+        ----------
+        c : Coefficients
+            In any consistent units.
+        q : record
+            The model's own parameters by name.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must build a string")
+
+
+class LumpedString(StringModel):
+    """One axial and one torsional spring between the top end and the bit (Eq. 1)."""
+
+    def build(self, c: Coefficients, q: Any) -> String:
+        """Return the paper's string."""
+        ka, kt = c.axial_stiffness, c.torsional_stiffness
+        return String(
+            {"x": "length", "theta": "angle", "x_top": "length", "theta_top": "angle"},
+            mass=[[c.mass, 0, 0, 0], [0, c.inertia, 0, 0], [0] * 4, [0] * 4],
+            damping=[[c.axial_damping, 0, 0, 0], [0, c.torsional_damping, 0, 0], [0] * 4, [0] * 4],
+            stiffness=[[ka, 0, -ka, 0], [0, kt, 0, -kt], [-ka, 0, ka, 0], [0, -kt, 0, kt]],
+        )
+
+
+class StringFunction(StringModel):
+    """A string from a plain function c → String; workers need one that can be imported."""
+
+    def __init__(self, function: Callable[[Coefficients], String]) -> None:
+        super().__init__()
+        self.__dict__["function"] = function
+
+    @property
+    def form(self) -> Any:
+        """The function itself."""
+        return StringFunction, self.__dict__["function"]
+
+    def build(self, c: Coefficients, q: Any) -> String:
+        """Return what the function says."""
+        made = self.__dict__["function"](c)
+        if not isinstance(made, String):
+            raise InputError("string", type(made).__name__, "a String from the function given")
+        return made

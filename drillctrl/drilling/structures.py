@@ -132,8 +132,9 @@ def soft_torque(stiffness: float = 10.0, damping: float = 10.0) -> FeedbackStruc
     Parameters
     ----------
     stiffness, damping : float
-        Largest k and d, in units of Kt and of the root of Kt times the bit's inertia. Matched
-        impedance is d near 1; a stiff drive has both large.
+        Largest k and d, in units of Kt and of the root of Kt times the bit's inertia. With a
+        drive of inertia ratio J and the bit off the rock the fastest pair is k = J and
+        d = 2√J; a stiff drive has both large.
     """
     most = [
         checked_number("stiffness", stiffness, 0.0, 1e9, open_low=True),

@@ -12,7 +12,7 @@ from drillctrl.charts.figure import draw_curves, label_axes
 from drillctrl.charts.stabilisable import stabilisable_chart
 from drillctrl.delay.closing import close_loop
 from drillctrl.designs.design import design
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.structures import preset_structure
 from drillctrl.paper.agreement import DIFFERS, Agreement, compared, stated

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.optimize
 
 from drillctrl.delay.closing import close_loop
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.drilling.structures import preset_structure

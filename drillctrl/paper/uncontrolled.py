@@ -9,7 +9,7 @@ from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.discretised import root_locus
 from drillctrl.charts.figure import plot_charts
 from drillctrl.charts.volume import stability_volume
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.paper.agreement import AGREES, DIFFERS, Agreement, compared, stated
 from drillctrl.paper.panels import Reproduced, panels

@@ -46,7 +46,7 @@ def kernel_sources() -> dict[str, str]:
     """Return file name → source of the kernel package, with the physics generated."""
     import numba
 
-    from drillctrl.drilling.plant import branch_functions
+    from drillctrl.drilling.branches import branch_functions
     from drillctrl.simulation.translate import translate_module
 
     sources = {

@@ -13,7 +13,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.coefficients import INPUT_NAMES, STATE_NAMES
+from drillctrl.drilling.branches import INPUT_NAMES, STATE_NAMES
 from drillctrl.drilling.structures import preset_structure
 
 DELAYS = ("fixed", "current")

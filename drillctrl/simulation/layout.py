@@ -9,8 +9,13 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.linear import linear_depth, linearisation, parameter_vector
-from drillctrl.drilling.plant import branch_functions, dimensionless_plant
+from drillctrl.drilling.branches import (
+    branch_functions,
+    dimensionless_plant,
+    linear_depth,
+    linearisation,
+    parameter_vector,
+)
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller

@@ -10,7 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.coefficients import STATE_NAMES
+from drillctrl.drilling.branches import STATE_NAMES
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.past import Past
 

@@ -19,7 +19,7 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import write_text
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.drilling.coefficients import STATE_NAMES
+from drillctrl.drilling.branches import STATE_NAMES
 from drillctrl.simulation.controller import Controller
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.grid import Grid

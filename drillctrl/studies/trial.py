@@ -11,7 +11,7 @@ import numpy as np
 
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller

@@ -13,7 +13,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.loops import spectral_abscissas
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.measures import worst_case

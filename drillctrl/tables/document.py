@@ -15,8 +15,8 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure, Tie
-from drillctrl.drilling.coefficients import INPUT_NAMES, STATE_NAMES
 from drillctrl.drilling.gain_units import rig_gain_units
+from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.tables.grid import MAX_NODES, Axis, Grid
@@ -115,7 +115,7 @@ def _columns(table: GainTable) -> tuple[dict[str, FloatArray], dict[str, str]]:
         units["delay_s"] = "s"
         for name, (factor, unit), values in zip(
             structure.entry_names,
-            rig_gain_units(structure, rig) or [],
+            rig_gain_units(structure, paper_plant(), rig) or [],
             table.entries.T,
             strict=False,
         ):
@@ -206,7 +206,10 @@ def _words(name: str, value: Any) -> str:
 
 
 def _read_structure(layout: dict[str, Any]) -> FeedbackStructure:
-    for what, known in (("outputs", STATE_NAMES), ("inputs", INPUT_NAMES)):
+    for what, known in (
+        ("outputs", paper_plant().output_names),
+        ("inputs", paper_plant().input_names),
+    ):
         names = layout[what]
         if not (1 <= len(names) <= len(known) and set(names) <= set(known)):
             raise ValueError(f"{what} {str(names)[:60]}")

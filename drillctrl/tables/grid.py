@@ -6,17 +6,15 @@ import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.coefficients import rig_coefficients
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.drilling.steady import rig_parameter_values, rig_point_at_weight_on_bit, steady_load
+from drillctrl.drilling.steady import rig_point_at_weight_on_bit, weight_on_bit
 
 MAX_NODES = 1_000_000
 
@@ -187,10 +185,7 @@ class Grid:
         length = rig.axial_scale * rig.rock_strength / strength
         feed = groups[:, 1] * speed * length
         if self.axes[1].name == "weight_on_bit":
-            values = dict(rig_parameter_values(RigPoint(rig, 1.0, 0.0)))
-            given = {"rotary_speed": speed, "penetration_rate": feed, "rock_strength": strength}
-            load = steady_load(rig_coefficients(SimpleNamespace(**{**values, **given})))
-            feed = np.asarray(load.weight_on_bit, dtype=float)
+            feed = weight_on_bit(rig, speed, feed, strength)
         return np.column_stack([speed, feed, strength])
 
 

@@ -14,7 +14,7 @@ from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
 from drillctrl.designs.loop_analysis import analyze_loop
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.synthesis.certificate import certify_optimality
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family

@@ -14,8 +14,8 @@ import numpy as np
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.coefficients import STATE_NAMES
 from drillctrl.drilling.gain_units import rig_gain_units
+from drillctrl.drilling.plant import paper_plant
 from drillctrl.tables.document import to_document
 from drillctrl.tables.grid import DIMENSIONLESS, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
@@ -109,11 +109,12 @@ def checked_sampling(
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
         raise InputError("name", name, "an identifier of at most 31 characters, such as gain_table")
     # The words go into comments, which other names might end.
-    if not set(structure.outputs) <= set(STATE_NAMES):
-        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(STATE_NAMES)}")
+    known = paper_plant().output_names
+    if not set(structure.outputs) <= set(known):
+        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(known)}")
     if len(structure.inputs) != 1:
         raise InputError("structure", structure.name, "one with a single input")
-    if grid.rig is not None and rig_gain_units(structure, grid.rig) is None:
+    if grid.rig is not None and rig_gain_units(structure, paper_plant(), grid.rig) is None:
         raise InputError("structure", structure.name, "torque fed back from θ and θ'")
     longest = max(point.delay for point in grid.points)
     longest *= grid.rig.time_scale if grid.rig is not None else 1.0
@@ -144,7 +145,7 @@ def sampled_controller(
     """
     grid, structure, rig = table.grid, table.structure, table.grid.rig
     step, bound, depth, count = checked_sampling(grid, structure, name, period, limit, ramp)
-    factors = rig_gain_units(structure, rig)
+    factors = rig_gain_units(structure, paper_plant(), rig)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
     constant = mode == CONSTANT

@@ -4,6 +4,7 @@ import pytest
 from drillctrl import (
     InputError,
     OperatingPoint,
+    as_case,
     close_loop,
     design,
     dominant_roots,
@@ -25,7 +26,7 @@ def characteristic_by_hand(s, point, ratio, stiffness, damping):
 
 @pytest.mark.parametrize("ratio", [0.5, 3.0])
 def test_roots_solve_the_equation_by_hand(point_c, ratio):
-    plant = plant_system(point_c, ("drive",), top_drive_plant(ratio))
+    plant = as_case(point_c, top_drive_plant(ratio)).system(("drive",))
     loop = close_loop(plant, soft_torque(), [-1.3, -2.7])
     for root in dominant_roots(loop)[:6]:
         value = characteristic_by_hand(root.value, point_c, ratio, 1.3, 2.7)
@@ -34,7 +35,7 @@ def test_roots_solve_the_equation_by_hand(point_c, ratio):
 
 
 def test_a_heavy_drive_held_stiffly_is_the_imposed_speed(point_c):
-    plant = plant_system(point_c, ("drive",), top_drive_plant(1e5))
+    plant = as_case(point_c, top_drive_plant(1e5)).system(("drive",))
     loop = close_loop(plant, soft_torque(1e6, 1e6), [-1e6, -1e6])
     fixed = spectral_abscissa(plant_system(point_c))
     assert spectral_abscissa(loop) == pytest.approx(fixed, abs=1e-5)
@@ -42,7 +43,7 @@ def test_a_heavy_drive_held_stiffly_is_the_imposed_speed(point_c):
 
 def test_soft_torque_stabilises_what_an_imposed_speed_does_not(point_c):
     assert spectral_abscissa(plant_system(point_c)) > 0
-    result = design(point_c, soft_torque(), plant=top_drive_plant(1.0))
+    result = design(as_case(point_c, top_drive_plant(1.0)), soft_torque())
     assert result.stable
     # Weakly held and well damped: near the matched impedance, far from the bounds.
     assert -3.0 < result.K1[0, 0] < 0.0
@@ -51,7 +52,7 @@ def test_soft_torque_stabilises_what_an_imposed_speed_does_not(point_c):
 
 def test_it_leaves_the_regenerative_axial_mode_alone():
     point = OperatingPoint(5.1, 0.25, 14.0)
-    result = design(point, soft_torque(), plant=top_drive_plant(1.0))
+    result = design(as_case(point, top_drive_plant(1.0)), soft_torque())
     assert not result.stable
     assert result.spectral_abscissa == pytest.approx(
         spectral_abscissa(plant_system(point)), abs=1e-4

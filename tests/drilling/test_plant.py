@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drillctrl import OperatingPoint, RigPoint, plant_system, table1
+from drillctrl import OperatingPoint, RigPoint, as_case, plant_system, table1
 from drillctrl.drilling.coefficients import RIG_PARAMETER_NAMES
-from drillctrl.drilling.linear import linearisation, linearisation_sensitivity, parameter_vector
-from drillctrl.drilling.plant import dimensional_plant, dimensionless_plant, rhs_function
+from drillctrl.drilling.linear import linear_arrays, linearisation_sensitivity, rhs_function
+from drillctrl.drilling.plant import paper_plant, rig_plant
 from drillctrl.drilling.steady import rig_parameter_values
 
 from ..strategies import points
@@ -63,11 +63,11 @@ def test_si_and_dimensionless_motion_are_the_same(states, tau, axial, torque):
     time, length = rig.time_scale, rig.axial_scale
     unit = np.array([length, length / time, 1.0, 1.0 / time])
     now, then = np.array(states[:4]), np.array(states[4:])
-    plain = rhs_function(dimensionless_plant())(
-        now, then, tau, [axial, torque], parameter_vector(point)
+    plain = rhs_function(paper_plant())(
+        now, then, tau, [axial, torque], as_case(point).parameter_vector
     )
     values = rig_parameter_values(rig_point)
-    si = rhs_function(dimensional_plant())(
+    si = rhs_function(rig_plant())(
         now * unit,
         then * unit,
         tau * time,
@@ -82,8 +82,8 @@ def test_si_and_dimensionless_motion_are_the_same(states, tau, axial, torque):
 @given(points)
 def test_steady_drilling_is_an_equilibrium(point):
     zero = np.zeros(4)
-    rate = rhs_function(dimensionless_plant())(
-        zero, zero, point.delay, [0, 0], parameter_vector(point)
+    rate = rhs_function(paper_plant())(
+        zero, zero, point.delay, [0, 0], as_case(point).parameter_vector
     )
     scale = 1 + point.psi * 2 * np.pi * point.delta0 + point.lam
     assert np.abs(np.array(rate)).max() < 1e-14 * scale
@@ -94,8 +94,8 @@ def test_linear_model_is_the_limit_of_the_nonlinear_one(point):
     """Central difference of the motion with τ solved from its own condition."""
     if point.delta0 < 0.1:
         point = point.with_changes(delta0=0.1)
-    system, f = plant_system(point), rhs_function(dimensionless_plant())
-    p, h = parameter_vector(point), 1e-6
+    system, f = plant_system(point), rhs_function(paper_plant())
+    p, h = as_case(point).parameter_vector, 1e-6
     for j in range(8):
         sides = []
         for sign in (1.0, -1.0):
@@ -111,12 +111,14 @@ def test_linear_model_is_the_limit_of_the_nonlinear_one(point):
 
 @given(points)
 def test_parameter_sensitivity_matches_differences(point):
-    plant = dimensionless_plant()
-    jacobian = np.array(linearisation_sensitivity(plant)(parameter_vector(point)))
-    p = parameter_vector(point)
+    plant = paper_plant()
+    jacobian = np.array(linearisation_sensitivity(plant)(as_case(point).parameter_vector))
+    p = as_case(point).parameter_vector
 
     def stacked(vector):
-        return np.concatenate([np.array(v).ravel(order="F") for v in linearisation(plant)(vector)])
+        a0, left, right, b, _, tau, _ = linear_arrays(plant, vector[None, :])
+        matrices = (a0[0], left[0] @ right[0], b[0])
+        return np.concatenate([*(m.ravel(order="F") for m in matrices), tau])
 
     for j in range(p.size):
         h = 1e-6 * (1 + abs(p[j]))

@@ -7,9 +7,9 @@ import pytest
 
 from drillctrl.base.errors import InputError
 from drillctrl.delay.closing import close_loop
-from drillctrl.drilling.linear import plant_system
+from drillctrl.delay.instrumentation import with_actuator_lag
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.drilling.sensors import with_actuator_lag
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.floquet import floquet, multipliers_at
 from drillctrl.simulation.orbits import limit_cycle

@@ -8,8 +8,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from drillctrl.drilling.linear import parameter_vector
-from drillctrl.drilling.plant import branch_functions, dimensionless_plant, rhs_function
+from drillctrl.drilling.branches import (
+    branch_functions,
+    dimensionless_plant,
+    parameter_vector,
+    rhs_function,
+)
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.translate import translate

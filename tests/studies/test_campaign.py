@@ -12,7 +12,7 @@ from drillctrl import dimensionless_grid, linear_axis, table
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError
 from drillctrl.delay.closing import close_loop
-from drillctrl.drilling.linear import plant_system
+from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.structures import preset_structure
 from drillctrl.simulation.controller import Controller

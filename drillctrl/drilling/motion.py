@@ -1,0 +1,155 @@
+"""What the integrator needs of a plant: compiled code of its law, and arrays of all else."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.bit_rock import (
+    BitRock,
+    Contact,
+    Rates,
+    kinematics,
+    pitch,
+    steady_load,
+)
+from drillctrl.drilling.coefficients import Coefficients
+from drillctrl.drilling.linear import BIT_STATES, linear_bit, linearisation
+from drillctrl.drilling.plant import Plant, by_form, expressions
+
+
+def _record(law: BitRock) -> tuple[ca.SX, Coefficients, Any]:
+    """Return a vector of symbols, and the coefficients and the law's parameters in it."""
+    c = [ca.SX.sym(name) for name in Coefficients._fields]
+    own = {name: ca.SX.sym(name) for name in law.values}
+    return ca.vertcat(*c, *own.values()), Coefficients(*c), SimpleNamespace(**own)
+
+
+def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
+    """Return the bit in the rock on one branch of its switches, for event-driven use.
+
+    Parameters
+    ----------
+    law : BitRock
+        Its form counts; its values and all coefficients are the argument q.
+
+    Returns
+    -------
+    load : Function
+        (contact, rates, q) → weight and torque on bit; see `Contact` and `Rates`.
+    depth, turned : Function
+        (X, Xd, τ, q) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8). X and Xd
+        are the bit's four states.
+    rates : Function
+        (X, q) → Z', Φ'.
+    """
+    q, c, own = _record(law)
+    now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
+    delay = ca.SX.sym("delay")
+    contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
+    bit = kinematics(c, ca.vertsplit(now), ca.vertsplit(then), delay)
+    load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
+    arguments = [now, then, delay, q]
+    return (
+        ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)]),
+        ca.Function("depth", arguments, [bit.depth]),
+        ca.Function("turned", arguments, [bit.turned - pitch(c)]),
+        ca.Function("rates", [now, q], [ca.vertcat(*bit.rates)]),
+    )
+
+
+class MotionArrays(NamedTuple):
+    """A plant at one set of parameters, as the integrator takes it.
+
+    Attributes
+    ----------
+    q : array
+        Coefficients, then the law's own parameters: what `law_functions` take.
+    steady : array, (2,)
+        Weight and torque on bit of steady drilling.
+    A, E, B, T, C, R : array
+        As in `Realisation`.
+    late : tuple of (float, array (n, n))
+        Terms that act with a delay.
+    linear : array, (n, n)
+        A with the load linearised.
+    linear_delayed : array, (n, 4)
+        Acts on the bit's states τ0 ago.
+    depth : array, (9,)
+        c1, c2 and d0 of the linear depth of cut.
+    """
+
+    q: FloatArray
+    steady: FloatArray
+    A: FloatArray
+    E: FloatArray
+    B: FloatArray
+    T: FloatArray
+    C: FloatArray
+    R: FloatArray
+    late: tuple[tuple[float, FloatArray], ...]
+    linear: FloatArray
+    linear_delayed: FloatArray
+    depth: FloatArray
+
+
+@by_form
+def _motion_function(plant: Plant) -> ca.Function:
+    form = expressions(plant)
+    made = form.structure
+    own = [getattr(form.q, name) for name in plant.bit.values]
+    load = ca.vertcat(*steady_load(form.bit, form.c, form.q))
+    matrices = [made.A, made.E, made.B, made.T, made.C, made.R]
+    late = [value for term in made.late for value in term]
+    q = ca.vertcat(*[ca.SX(value) for value in (*form.c, *own)])
+    outputs = [ca.densify(ca.SX(value)) for value in (q, load, *matrices, *late)]
+    return ca.Function("motion", [form.parameters], outputs)
+
+
+def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
+    """Return a plant's arrays at one set of parameters.
+
+    Raises
+    ------
+    InputError
+        If axial and torsional structure meet elsewhere than at the bit.
+    """
+    values = [value.full() for value in _motion_function(plant)(parameters)]
+    q, steady, a, e, b, t, c, r, *rest = values
+    if e[1, 1] != 0.0 or e[3, 0] != 0.0:
+        raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
+    late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
+    c1, c2, *_, d0 = (value.full() for value in linear_bit(plant)(parameters))
+    linear = [value.full() for value in linearisation(plant)(parameters)[:3]]
+    delayed = linear[1] @ linear[2][:, :BIT_STATES]
+    return MotionArrays(
+        q.ravel(), steady.ravel(), a, e, b, t, c, r, late, linear[0], delayed,
+        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]),
+    )  # fmt: skip
+
+
+def rest_state(arrays: MotionArrays) -> FloatArray:
+    """Return the state of an unloaded bit at rest while the top end is at V0 t and Ω0 t, (n,).
+
+    Raises
+    ------
+    InputError
+        If nothing holds the string at its top, as with a drive that is free to turn.
+    """
+    c = Coefficients(*arrays.q[: len(Coefficients._fields)])
+    follows = arrays.R[: arrays.A.shape[0]]
+    places = (follows[:, 0] + follows[:, 2]) != 0.0
+    moving = (follows[:, 1] + follows[:, 3]) != 0.0
+    state = -follows[:, 1] * c.penetration_rate - follows[:, 3] * c.rotary_speed
+    wanted = (arrays.E @ arrays.steady - arrays.A @ state)[moving]
+    held = arrays.A[np.ix_(moving, places)]
+    found, _, rank, _ = np.linalg.lstsq(held, wanted, rcond=None)
+    if rank < places.sum():
+        raise InputError("start", "rest", "steady where nothing holds the string at its top")
+    state[places] = found
+    return np.asarray(state)

@@ -1,0 +1,161 @@
+"""A string and its blocks as first-order equations X' = A X + E w + B u + T top, Y = C X − R top.
+
+w is the load on the bit beyond the steady one, (weight, torque); top is what the top end has
+moved beyond V0 t and Ω0 t: (x, x', θ, θ').
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.coefficients import Expression
+from drillctrl.drilling.quantities import EFFORTS, RATES, Signal
+from drillctrl.drilling.string import BIT, TOP, String
+
+
+class Late(NamedTuple):
+    """A term matrix · X(t − delay), of a signal that arrives late."""
+
+    delay: Expression
+    matrix: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class Realisation:
+    """First-order equations of a linear structure.
+
+    Attributes
+    ----------
+    states, inputs, outputs : tuple of Signal
+        n, m and p of them. The first four states are the bit's x, x', θ, θ'.
+    A, E, B, T : SX, (n, n), (n, 2), (n, m), (n, 4)
+        Of the equations of motion.
+    C, R : SX, (p, n), (p, 4)
+        Of the outputs.
+    late : tuple of Late
+        Terms that act with a delay.
+    """
+
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    A: ca.SX
+    E: ca.SX
+    B: ca.SX
+    T: ca.SX
+    C: ca.SX
+    R: ca.SX
+    late: tuple[Late, ...] = ()
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple(state.name for state in self.states)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(signal.name for signal in self.inputs)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(signal.name for signal in self.outputs)
+
+    def with_output(self, signal: Signal, row: ca.SX, reference: ca.SX) -> Realisation:
+        """Return the realisation with one more output row X − reference top."""
+        return replace(
+            self,
+            outputs=(*self.outputs, signal),
+            C=ca.vertcat(self.C, row),
+            R=ca.vertcat(self.R, reference),
+        )
+
+
+def realise(string: String) -> Realisation:
+    """Return the first-order equations of a string; all states are outputs.
+
+    Raises
+    ------
+    InputError
+        If a name is used twice.
+    """
+    names = list(string.coordinates)
+    free = [i for i, name in enumerate(names) if name not in string.imposed]
+    inverse = _inverse(string.mass[free, free])
+    count = len(free)
+    a, t = ca.SX(2 * count, 2 * count), ca.SX(2 * count, 4)
+    reference = ca.SX(2 * count, 4)
+    for i in range(count):
+        a[2 * i, 2 * i + 1] = 1
+    a[1::2, 0::2] = -(inverse @ string.stiffness[free, free])
+    a[1::2, 1::2] = -(inverse @ string.damping[free, free])
+    for k, top in enumerate(TOP):
+        if top in string.imposed:
+            column = names.index(top)
+            t[1::2, 2 * k] = -(inverse @ string.stiffness[free, column])
+            t[1::2, 2 * k + 1] = -(inverse @ string.damping[free, column])
+    states = []
+    for row, i in enumerate(free):
+        quantity = string.coordinates[names[i]]
+        states += [Signal(names[i], quantity), Signal(f"d{names[i]}", RATES[quantity])]
+        usual = TOP[0] if quantity == "length" else TOP[1]
+        followed = string.reference.get(names[i], usual)
+        if followed is not None:
+            place = 2 * TOP.index(followed)
+            reference[2 * row, place] = 1
+            reference[2 * row + 1, place + 1] = 1
+    load = ca.SX(2 * count, 2)
+    for k, coordinate in enumerate(BIT):
+        load[1::2, k] = -inverse[:, free.index(names.index(coordinate))]
+    b = ca.SX(2 * count, len(string.inputs))
+    inputs = []
+    for k, (name, coordinate) in enumerate(string.inputs.items()):
+        if coordinate in string.imposed:
+            wanted = "a coordinate whose motion is not imposed"
+            raise InputError(f"input {name}", coordinate, wanted)
+        b[1::2, k] = inverse[:, free.index(names.index(coordinate))]
+        inputs.append(Signal(name, EFFORTS[string.coordinates[coordinate]]))
+    made = Realisation(
+        tuple(states), tuple(inputs), tuple(states), a, load, b, t,
+        ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
+    )  # fmt: skip
+    for name, (quantity, weights) in string.outputs.items():
+        made = made.with_output(Signal(name, quantity), *weighted(made, name, weights))
+    _check_names(made)
+    return made
+
+
+def weighted(made: Realisation, name: str, weights: object) -> tuple[ca.SX, ca.SX]:
+    """Return the rows of C and R of a weighted sum of states."""
+    row = ca.SX(1, len(made.states))
+    for state, factor in dict(weights).items():  # type: ignore[call-overload]
+        if state not in made.state_names:
+            raise InputError(f"output {name}", state, f"of {', '.join(made.state_names)}")
+        row[0, made.state_names.index(state)] = factor
+    # Every state is an output, in its own place: its reference is known.
+    return row, row @ made.R[: len(made.states), :]
+
+
+def _inverse(mass: ca.SX) -> ca.SX:
+    """Return the inverse of a mass matrix; entry by entry where it is diagonal."""
+    if mass.sparsity().is_diag() and mass.nnz() == mass.shape[0]:
+        return ca.diag(1 / ca.diag(mass))
+    if mass.is_constant():
+        return ca.SX(ca.inv(ca.DM(mass)))
+    return ca.inv(mass)
+
+
+def _check_names(made: Realisation) -> None:
+    for what, names in (
+        ("states", made.state_names),
+        ("inputs", made.input_names),
+        ("outputs", made.output_names),
+    ):
+        twice = [name for i, name in enumerate(names) if name in names[:i]]
+        if twice:
+            raise InputError(what, twice[0], "a name that is used once")
