@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from drillctrl.drilling.rig import Rig, load_rig, save_rig, table1
     from drillctrl.drilling.sensors import Filtered, Lagging
     from drillctrl.drilling.steady import SteadyState, rig_point_at_weight_on_bit, steady_state
-    from drillctrl.drilling.string import String, StringModel
+    from drillctrl.drilling.string import String, StringModel, spring_string
     from drillctrl.drilling.structures import feed, preset_structure, soft_torque
     from drillctrl.interop.controllers import controller_system, scheduled_controller
     from drillctrl.interop.lifted import lifted_system, pade_approximation
@@ -126,6 +126,7 @@ _HOME = {
     "Stribeck": "drilling.friction",
     "String": "drilling.string",
     "StringModel": "drilling.string",
+    "spring_string": "drilling.string",
     "Tie": "delay.structure",
     "TopDrive": "drilling.drive",
     "WorstCase": "designs.worst_case",
@@ -308,6 +309,7 @@ __all__ = [
     "soft_torque",
     "spectral_abscissa",
     "spectral_abscissas",
+    "spring_string",
     "stabilisable_chart",
     "stability_radius",
     "stability_volume",

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.figure import GREY, ORANGE, new_axes
-from drillctrl.charts.axes import GROUPS, Axis, make_axis
+from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.figure import axis_text, draw_curves
 from drillctrl.charts.plane import AxisLike, make_plane

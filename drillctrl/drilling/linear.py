@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.drilling.bit_rock import (
     Contact,
-    Rates,
     kinematics,
     steady_delay,
     steady_depth,
@@ -22,44 +21,64 @@ from drillctrl.drilling.plant import Plant, by_form, expressions
 BIT_STATES = 4
 
 
+class _SteadyBit(NamedTuple):
+    """The bit about steady drilling, in symbols: what it meets, and how that follows X."""
+
+    depth_now: ca.SX
+    depth_then: ca.SX
+    load_now: ca.SX
+    load_depth: ca.SX
+
+
 @by_form
-def linear_bit(plant: Plant) -> ca.Function:
-    """Linearise depth of cut and load about steady drilling: p → c1, c2, Jd, Jr, d0.
+def _steady_bit(plant: Plant) -> _SteadyBit:
+    """Differentiate depth of cut and load by the bit's four states, now and τ ago.
 
-    Returns
-    -------
-    Function
-        c1, c2 (1, 4): rows of the depth of cut d0 + c1 Xb + c2 Xb(t − τ0) of the bit's four
-        states (Eqs. 17, 19); Jd (2, 1), Jr (2, 2): derivatives of the load by the depth and
-        by Z', Φ'; d0.
-
-    Notes
-    -----
     The state-dependent delay is removed by the implicit function theorem: with g the
     condition on the delay, δτ = −(g_X δX + g_Xd δXd)/g_τ.
     """
     form = expressions(plant)
     now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
-    delay, depth, rates = ca.SX.sym("delay"), ca.SX.sym("depth"), ca.SX.sym("rates", 2)
+    delay, cut = ca.SX.sym("delay"), ca.SX.sym("cut")
     bit = kinematics(form.c, ca.vertsplit(now), ca.vertsplit(then), delay)
 
-    def row(variable: ca.SX) -> ca.SX:
-        dtau = -ca.jacobian(bit.turned, variable) / ca.jacobian(bit.turned, delay)
-        return ca.densify(ca.jacobian(bit.depth, variable) + ca.jacobian(bit.depth, delay) @ dtau)
+    def load(depth: ca.SX) -> Any:
+        # Cutting goes on, the flat is pressed and rubs: the branch of steady drilling.
+        contact = Contact(depth, 1.0, 1.0)
+        bears = form.bit.load(form.c, contact, bit.rates, form.q)
+        return ca.vertcat(bears.weight_on_bit, bears.torque_on_bit)
 
-    # Cutting goes on, the flat is pressed and rubs: the branch that steady drilling is on.
-    contact = Contact(depth, 1.0, 1.0)
-    load = ca.vertcat(*form.bit.load(form.c, contact, Rates(*ca.vertsplit(rates)), form.q))
-    slopes = [ca.densify(ca.jacobian(load, variable)) for variable in (depth, rates)]
-    steady = (
-        (depth, steady_depth(form.c)),
-        (rates, ca.vertcat(form.c.penetration_rate, form.c.rotary_speed)),
-    )
-    for symbol, value in steady:
-        slopes = ca.substitute(slopes, [symbol], [value])
-    outputs = [row(now), row(then), *slopes, steady_depth(form.c)]
-    names = ["c1", "c2", "Jd", "Jr", "d0"]
-    return ca.Function("linear_bit", [form.parameters], outputs, ["p"], names)
+    def follows(value: ca.SX, variable: ca.SX) -> ca.SX:
+        dtau = -ca.jacobian(bit.turned, variable) / ca.jacobian(bit.turned, delay)
+        slope: ca.SX = ca.jacobian(value, variable) + ca.jacobian(value, delay) @ dtau
+        return slope
+
+    found = [
+        follows(bit.depth, now),
+        follows(bit.depth, then),
+        follows(load(bit.depth), now),
+        ca.jacobian(load(cut), cut),
+    ]
+    nothing = ca.SX.zeros(BIT_STATES)
+    for symbol, value in (
+        (now, nothing),
+        (then, nothing),
+        (delay, steady_delay(form.c)),
+        (cut, steady_depth(form.c)),
+    ):
+        found = ca.substitute(found, [symbol], [value])
+    return _SteadyBit(*map(ca.densify, found))
+
+
+@by_form
+def linear_depth(plant: Plant) -> ca.Function:
+    """Return p → c1, c2, d0 of the linear depth of cut d0 + c1 X + c2 Xd (Eqs. 17, 19).
+
+    X and Xd are the bit's four states.
+    """
+    form, bit = expressions(plant), _steady_bit(plant)
+    outputs = [bit.depth_now, bit.depth_then, steady_depth(form.c)]
+    return ca.Function("linear_depth", [form.parameters], outputs)
 
 
 @by_form
@@ -75,16 +94,12 @@ def linearisation(plant: Plant) -> ca.Function:
     """
     form = expressions(plant)
     structure = form.structure
-    c1, c2, jd, jr, _ = linear_bit(plant)(form.parameters)
-    n = structure.A.shape[0]
-    pick = ca.SX.eye(n)[:BIT_STATES, :]
-    feels = jd @ c1
-    feels[:, 1] = feels[:, 1] + jr[:, 0]
-    feels[:, 3] = feels[:, 3] + jr[:, 1]
+    bit = _steady_bit(plant)
+    pick = ca.SX.eye(structure.A.shape[0])[:BIT_STATES, :]
     outputs = [
-        ca.densify(structure.A + structure.E @ feels @ pick),
-        ca.densify(structure.E @ jd),
-        ca.densify(c2 @ pick),
+        ca.densify(structure.A + structure.E @ bit.load_now @ pick),
+        ca.densify(structure.E @ bit.load_depth),
+        ca.densify(bit.depth_then @ pick),
         ca.densify(structure.B),
         ca.densify(structure.C),
         steady_delay(form.c),

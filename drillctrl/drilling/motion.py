@@ -19,7 +19,7 @@ from drillctrl.drilling.bit_rock import (
     steady_load,
 )
 from drillctrl.drilling.coefficients import Coefficients
-from drillctrl.drilling.linear import BIT_STATES, linear_bit, linearisation
+from drillctrl.drilling.linear import BIT_STATES, linear_depth, linearisation
 from drillctrl.drilling.plant import Plant, by_form, expressions
 
 
@@ -124,7 +124,7 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     if e[1, 1] != 0.0 or e[3, 0] != 0.0:
         raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
     late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
-    c1, c2, *_, d0 = (value.full() for value in linear_bit(plant)(parameters))
+    c1, c2, d0 = (value.full() for value in linear_depth(plant)(parameters))
     linear = [value.full() for value in linearisation(plant)(parameters)[:3]]
     delayed = linear[1] @ linear[2][:, :BIT_STATES]
     return MotionArrays(

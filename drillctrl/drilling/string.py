@@ -81,6 +81,52 @@ class String:
             checked_quantity(name, quantity)
 
 
+def spring_string(
+    coordinates: Mapping[str, str],
+    masses: Mapping[str, Expression],
+    springs: Mapping[tuple[str, str], Expression],
+    dampers: Mapping[str | tuple[str, str], Expression],
+    **signals: Any,
+) -> String:
+    """Return a string of masses, springs and dampers.
+
+    Parameters
+    ----------
+    coordinates : mapping
+        As in `String`.
+    masses : mapping
+        Coordinate → mass or inertia.
+    springs : mapping
+        Pair of coordinates → stiffness between them.
+    dampers : mapping
+        Coordinate → damping of its velocity; pair → damping between them.
+    **signals
+        ``inputs``, ``outputs``, ``imposed`` and ``reference`` of `String`.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is unknown.
+    """
+    names = list(coordinates)
+    matrices = [ca.SX(len(names), len(names)) for _ in range(3)]
+
+    def place(name: str) -> int:
+        if name not in names:
+            raise InputError("coordinate", name, f"one of {', '.join(names)}")
+        return names.index(name)
+
+    all_elements: tuple[Mapping[Any, Expression], ...] = (masses, dampers, springs)
+    for matrix, elements in zip(matrices, all_elements, strict=True):
+        for ends, value in elements.items():
+            where = [place(name) for name in ((ends,) if isinstance(ends, str) else ends)]
+            for row, i in enumerate(where):
+                for column, j in enumerate(where):
+                    matrix[i, j] += value if row == column else -value
+    mass, damping, stiffness = matrices
+    return String(coordinates, mass, damping, stiffness, **signals)
+
+
 def as_matrix(name: str, given: Any) -> ca.SX:
     """Return a matrix of numbers and expressions as SX.
 
@@ -122,12 +168,14 @@ class LumpedString(StringModel):
 
     def build(self, c: Coefficients, q: Any) -> String:
         """Return the paper's string."""
-        ka, kt = c.axial_stiffness, c.torsional_stiffness
-        return String(
+        return spring_string(
             {"x": "length", "theta": "angle", "x_top": "length", "theta_top": "angle"},
-            mass=[[c.mass, 0, 0, 0], [0, c.inertia, 0, 0], [0] * 4, [0] * 4],
-            damping=[[c.axial_damping, 0, 0, 0], [0, c.torsional_damping, 0, 0], [0] * 4, [0] * 4],
-            stiffness=[[ka, 0, -ka, 0], [0, kt, 0, -kt], [-ka, 0, ka, 0], [0, -kt, 0, kt]],
+            masses={"x": c.mass, "theta": c.inertia},
+            springs={
+                ("x", "x_top"): c.axial_stiffness,
+                ("theta", "theta_top"): c.torsional_stiffness,
+            },
+            dampers={"x": c.axial_damping, "theta": c.torsional_damping},
         )
 
 

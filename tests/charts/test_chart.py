@@ -214,8 +214,8 @@ def test_rig_axes_agree_with_the_dimensionless_chart():
     rng = np.random.default_rng(2)
     for x, y in zip(rng.uniform(30, 300, 12), rng.uniform(1, 60, 12), strict=True):
         other = RigPoint(table1(), x * np.pi / 30.0, y / 3600.0).operating_point()
-        assert drawn.plane.operating_point(x, y).omega0 == pytest.approx(other.omega0)
-        assert drawn.plane.operating_point(x, y).delta0 == pytest.approx(other.delta0)
+        assert drawn.plane.case_at(x, y).point.omega0 == pytest.approx(other.omega0)
+        assert drawn.plane.case_at(x, y).point.delta0 == pytest.approx(other.delta0)
         alpha = spectral_abscissas(other)[0]
         if abs(alpha) > 5e-3:
             assert covered(drawn, x, y) == (alpha < 0.0)

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drillctrl.base.errors import InputError
-from drillctrl.delay.structure import preset_structure
 from drillctrl.drilling.bit_rock import BitRock, PaperLaw
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.drive import TopDrive
@@ -19,13 +18,14 @@ from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.drilling.sensors import Filtered, Lagging
-from drillctrl.drilling.string import String
+from drillctrl.drilling.string import String, spring_string
+from drillctrl.drilling.structures import preset_structure
 
 
 class CuttingWeakening(BitRock):
     """Cutting torque and weight that fall with speed, and a weight that feels Z'."""
 
-    parameters = {"share": 0.3, "drag": 0.2}  # noqa: RUF012
+    parameters = {"share": 0.3, "drag": 0.2}
 
     def load(self, c, contact, rates, q):
         plain = PaperLaw().load(c, contact, rates, q)
@@ -40,16 +40,15 @@ def collar(c):
     """A second inertia halfway up, with a torque of its own."""
     k = 2 * c.torsional_stiffness
     names = {"x": "length", "theta": "angle", "theta_2": "angle"}
-    stiffness = ca.SX(5, 5)
-    for i, j, value in ((0, 3, c.axial_stiffness), (1, 2, k), (2, 4, k)):
-        stiffness[i, i] += value
-        stiffness[j, j] += value
-        stiffness[i, j] = stiffness[j, i] = -value
-    return String(
+    return spring_string(
         {**names, "x_top": "length", "theta_top": "angle"},
-        mass=np.diag([1.0, 1.0, 0.5, 0.0, 0.0]),
-        damping=ca.diag(ca.vertcat(c.axial_damping, c.torsional_damping, 0.01, 0, 0)),
-        stiffness=stiffness,
+        masses={"x": c.mass, "theta": c.inertia, "theta_2": 0.5 * c.inertia},
+        springs={
+            ("x", "x_top"): c.axial_stiffness,
+            ("theta", "theta_2"): k,
+            ("theta_2", "theta_top"): k,
+        },
+        dampers={"x": c.axial_damping, "theta": c.torsional_damping, ("theta_2", "theta"): 0.01},
         inputs={"axial": "x", "torque": "theta", "surface": "theta_2"},
         outputs={"pipe_torque": ("torque", {"theta": k, "theta_2": -k})},
     )

@@ -201,7 +201,7 @@ def test_a_delay_system_of_the_user_is_designed_for():
 def test_a_worst_case_needs_an_operating_point():
     plant = DelaySystem([[0.5]], ([[0.0]],), (1.0,), [[1.0]], [[1.0]], output_names=("x",))
     structure = FeedbackStructure("late", ("x",), [[0]], [[0]], [[-5]], [[5]], ("u1",))
-    with pytest.raises(InputError, match="operating point"):
+    with pytest.raises(InputError, match="OperatingPoint, .* worst-case needs the physics"):
         design(plant, structure, objective=WorstCase())
 
 
