@@ -188,16 +188,17 @@ def _check_out(
         with naming("--out", "table"):
             check_table_path(out)
         return
-    from drillctrl.tables.export_c import check_c_header, check_real
+    from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
+    from drillctrl.tables.export_st import check_st_name
     from drillctrl.tables.sampled import checked_sampling
 
     for name in ("period", "limit"):
         if controller[name] is None:
             raise InputError(name, "(missing)", f"given for {out}")
-    stem = Path(out).stem if ending == ".c" else "FB_GainTable"
     with naming("--out", "name"):
+        (check_c_name if ending == ".c" else check_st_name)(Path(out).stem)
         checked_sampling(
-            grid, structure, stem, controller["period"], controller["limit"], controller["ramp"]
+            grid, structure, controller["period"], controller["limit"], controller["ramp"]
         )
         if ending == ".c":
             check_c_header(Path(out).with_suffix(".h"))

@@ -215,19 +215,13 @@ class Comparison:
         return csv_text([*CSV_COLUMNS, "delay_shorter", "delay_longer", "K1", "K2"], rows)
 
     def to_html(self) -> str:
-        """Return one page with the table and the figures in it.
-
-        Raises
-        ------
-        InputError
-            If jinja2 is not installed.
-        """
+        """Return one page with the table and the figures in it."""
         from drillctrl.studies.compare_page import comparison_page
 
         rows = [row.to_dict() for row in self.rows]
         designs = [row.design for row in self.rows]
         return comparison_page(
-            self.figures,
+            self.figures(),
             point=self._point_text(),
             sort=self.sort,
             disturbance=", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items()),

@@ -4,15 +4,30 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
-from drillctrl.tables.sampled import SampledController, filled, sampled_controller
+from drillctrl.base.templates import filled
+from drillctrl.drilling.gain_units import rig_gain_units
+from drillctrl.drilling.plant import paper_plant
+from drillctrl.drilling.quantities import SI_UNITS
+from drillctrl.tables.reserved import is_identifier
+from drillctrl.tables.sampled import sampled_controller
 from drillctrl.tables.table import GainTable
+
+# What the block declares, so that its own name is none of these.
+_VARIABLES = """
+    Measured Place DelayTime Enable Command Vouched PastSamples NewestSample ActiveSamples
+    GainValues CellShare CellLow AxisIndex EntryIndex CornerA CornerB CornerC CellKind NodeIndex
+    WholeSamples NearSample FarSample CornerWeight PartSample SamplesBack InsideTable
+    SamplePeriod CommandLimit RampSamples RingDepth TicksA TicksB TicksC NodeGains CellGains
+    CellKinds
+"""
+VARIABLES = frozenset(_VARIABLES.split())
 
 
 def export_st(
     table: GainTable,
     path: str | Path,
-    name: str = "FB_GainTable",
     *,
     period: float,
     limit: float,
@@ -21,7 +36,7 @@ def export_st(
     """Write one function block: lookup, delay line, saturation, soft switch-on.
 
     The same law, units and behaviour as the C controller of `export_c`, in LREAL; call it once
-    a sampling period.
+    a sampling period. The block has the name of its file, so that several stand in one project.
 
     Parameters
     ----------
@@ -29,234 +44,62 @@ def export_st(
         Over dimensionless groups, or in rig units: then the lookup takes the grid's axes in SI.
     path : str or Path
         The file, ending in .st.
-    name : str
-        Of the function block.
     period : float
         Sampling period, dimensionless or s.
     limit : float
-        Largest |U|, dimensionless or N·m.
+        Largest |u|, dimensionless or N·m.
     ramp : int, optional
         Samples of the switch-on, 0 for none; by default as many as the longest delay has.
 
     Raises
     ------
     InputError
-        If a value is out of range, the structure drives more than one input, or it has no
-        gains in rig units over a grid in rig units.
+        If a value is out of range, the file's name is none for a block, the structure drives
+        more than one input, or it has no gains in rig units over a grid in rig units.
     """
+    name = Path(path).stem
+    check_st_name(name)
     controller = sampled_controller(table, name, period, limit, ramp)
-    outputs, depth = int(controller.words["outputs"]), int(controller.words["depth"])
+    structure, plant, rig = table.structure, paper_plant(), table.grid.rig
+    gain_units = rig_gain_units(structure, plant, rig)
+    si = {name: SI_UNITS[plant.quantity(name)] for name in (*structure.outputs, *structure.inputs)}
+    outputs, depth = len(structure.outputs), int(controller.words["depth"])
+    sizes = dict(zip("ABC", map(len, controller.axes), strict=True))
+    arrays = {f"Ticks{letter}": ticks for letter, ticks in zip("ABC", controller.axes, strict=True)}
+    arrays["NodeGains"] = controller.node_gains
+    # An array of no elements is not Structured Text.
+    arrays["CellGains"] = controller.cell_gains or (0.0,)
     words = controller.words | {
-        "last": str(outputs - 1),
-        "gains": str(2 * outputs),
-        "lastgain": str(2 * outputs - 1),
-        "lastpast": str(depth * outputs - 1),
-        "reference": "\n   ".join(controller.reference),
+        "outputs": outputs,
+        "entries": 2 * outputs,
+        "depth": depth,
+        "sizes": sizes,
         "period": _number(controller.period),
         "limit": _number(controller.limit),
-        "tables": _tables(controller),
+        "reference": controller.reference,
+        "arrays": {label: [_number(v) for v in values] for label, values in arrays.items()},
+        "cell_mode": controller.cell_mode,
+        "time_unit": "s" if rig else "in units of time",
+        "command_unit": si[structure.inputs[0]].replace("·", " ")
+        if rig
+        else "in units of the torsional stiffness",
+        "measured_units": ", ".join(
+            f"{output} in {si[output]}" if rig else output for output in structure.outputs
+        ),
+        "gain_units": ", ".join(unit for _, unit in gain_units[:outputs])
+        if gain_units
+        else "dimensionless",
     }
-    for i, ticks in enumerate(controller.axes):
-        words[f"n{i}"] = str(len(ticks))
-        words[f"c{i}"] = str(max(1, len(ticks) - 1))
-    write_text(path, filled(_BLOCK, words))
+    write_text(path, filled("drillctrl.tables", "controller.st.j2", **words))
     return Path(path)
+
+
+def check_st_name(name: str) -> None:
+    """Raise `InputError` unless a function block may have a name."""
+    if not is_identifier(name) or name.upper() in {word.upper() for word in VARIABLES}:
+        permitted = "an identifier of at most 32 characters that is no word of Structured Text"
+        raise InputError("name", name, f"{permitted} or its libraries, such as gain_table")
 
 
 def _number(value: float) -> str:
     return f"{value:.17E}"
-
-
-def _array(kind: str, name: str, values: list[str]) -> str:
-    lines = [", ".join(values[i : i + 4]) for i in range(0, len(values), 4)]
-    body = ",\n        ".join(lines)
-    return f"    {name} : ARRAY[0..{len(values) - 1}] OF {kind} := [\n        {body}\n    ];"
-
-
-def _tables(controller: SampledController) -> str:
-    numbers = {f"Axis{i}": ticks for i, ticks in enumerate(controller.axes)}
-    numbers["NodeGains"] = controller.node_gains
-    # An array of no elements is not Structured Text.
-    numbers["CellGains"] = controller.cell_gains or (0.0,)
-    parts = [
-        _array("LREAL", label, [_number(value) for value in values])
-        for label, values in numbers.items()
-    ]
-    parts.append(_array("DINT", "CellMode", [str(mode) for mode in controller.cell_mode]))
-    return "\n".join(parts)
-
-
-_BLOCK = """\
-(* Scheduled delayed output feedback, generated by drillctrl; do not edit.
-   Law:     @law@
-   Delay:   @delay@
-   Outputs: Y = @names@, as perturbations from steady drilling
-   Units:   @units@
-   Sampled: @sampling@
-   Lookup:  Place = @axes@, clamped at the ends of the table
-   Table:   SHA-256 @checksum@
-   @reference@
-   Call once a sampling period. While Enable is FALSE, U is 0 and samples are stored. If what
-   is commanded is no finite number, U is 0. *)
-FUNCTION_BLOCK @name@
-VAR_INPUT
-    Y : ARRAY[0..@last@] OF LREAL;
-    Place : ARRAY[0..2] OF LREAL;
-    Delay : LREAL;
-    Enable : BOOL;
-END_VAR
-VAR_OUTPUT
-    U : LREAL;
-    Vouched : BOOL;
-END_VAR
-VAR
-    Past : ARRAY[0..@lastpast@] OF LREAL;
-    Newest : DINT := 0;
-    Active : DINT := 0;
-    Gains : ARRAY[0..@lastgain@] OF LREAL;
-    Share : ARRAY[0..2] OF LREAL;
-    Low : ARRAY[0..2] OF DINT;
-    I : DINT;
-    K : DINT;
-    O0 : DINT;
-    O1 : DINT;
-    O2 : DINT;
-    Mode : DINT;
-    Node : DINT;
-    Whole : DINT;
-    Near : DINT;
-    Far : DINT;
-    Weight : LREAL;
-    Part : LREAL;
-    Back : LREAL;
-    Inside : BOOL;
-END_VAR
-VAR CONSTANT
-    PERIOD : LREAL := @period@;
-    LIMIT : LREAL := @limit@;
-    RAMP : DINT := @ramp@;
-    DEPTH : DINT := @depth@;
-@tables@
-END_VAR
-
-Newest := (Newest + 1) MOD DEPTH;
-FOR K := 0 TO @last@ DO
-    Past[Newest * @outputs@ + K] := Y[K];
-END_FOR;
-
-Inside := TRUE;
-Low[0] := 0;
-Low[1] := 0;
-Low[2] := 0;
-Share[0] := 0.0;
-Share[1] := 0.0;
-Share[2] := 0.0;
-IF NOT (Place[0] >= Axis0[0] AND Place[0] <= Axis0[@n0@ - 1]) THEN
-    Inside := FALSE;
-END_IF;
-IF NOT (Place[1] >= Axis1[0] AND Place[1] <= Axis1[@n1@ - 1]) THEN
-    Inside := FALSE;
-END_IF;
-IF NOT (Place[2] >= Axis2[0] AND Place[2] <= Axis2[@n2@ - 1]) THEN
-    Inside := FALSE;
-END_IF;
-FOR I := 0 TO @n0@ - 2 DO
-    IF Place[0] >= Axis0[I] OR I = 0 THEN
-        Low[0] := I;
-        Share[0] := (Place[0] - Axis0[I]) / (Axis0[I + 1] - Axis0[I]);
-    END_IF;
-END_FOR;
-FOR I := 0 TO @n1@ - 2 DO
-    IF Place[1] >= Axis1[I] OR I = 0 THEN
-        Low[1] := I;
-        Share[1] := (Place[1] - Axis1[I]) / (Axis1[I + 1] - Axis1[I]);
-    END_IF;
-END_FOR;
-FOR I := 0 TO @n2@ - 2 DO
-    IF Place[2] >= Axis2[I] OR I = 0 THEN
-        Low[2] := I;
-        Share[2] := (Place[2] - Axis2[I]) / (Axis2[I + 1] - Axis2[I]);
-    END_IF;
-END_FOR;
-FOR I := 0 TO 2 DO
-    IF NOT (Share[I] > 0.0) THEN
-        Share[I] := 0.0;
-    END_IF;
-    IF Share[I] > 1.0 THEN
-        Share[I] := 1.0;
-    END_IF;
-END_FOR;
-
-Mode := CellMode[(Low[0] * @c1@ + Low[1]) * @c2@ + Low[2]];
-Vouched := Inside AND Mode >= 0;
-FOR K := 0 TO @lastgain@ DO
-    Gains[K] := 0.0;
-    IF Mode > 0 THEN
-        Gains[K] := CellGains[(Mode - 1) * @gains@ + K];
-    END_IF;
-END_FOR;
-IF Mode <= 0 THEN
-    FOR O0 := 0 TO 1 DO
-        FOR O1 := 0 TO 1 DO
-            FOR O2 := 0 TO 1 DO
-                Weight := 1.0;
-                IF O0 = 1 THEN
-                    Weight := Weight * Share[0];
-                ELSE
-                    Weight := Weight * (1.0 - Share[0]);
-                END_IF;
-                IF O1 = 1 THEN
-                    Weight := Weight * Share[1];
-                ELSE
-                    Weight := Weight * (1.0 - Share[1]);
-                END_IF;
-                IF O2 = 1 THEN
-                    Weight := Weight * Share[2];
-                ELSE
-                    Weight := Weight * (1.0 - Share[2]);
-                END_IF;
-                IF Weight > 0.0 THEN
-                    Node := ((Low[0] + O0) * @n1@ + Low[1] + O1) * @n2@ + Low[2] + O2;
-                    FOR K := 0 TO @lastgain@ DO
-                        Gains[K] := Gains[K] + Weight * NodeGains[Node * @gains@ + K];
-                    END_FOR;
-                END_IF;
-            END_FOR;
-        END_FOR;
-    END_FOR;
-END_IF;
-
-U := 0.0;
-IF Enable THEN
-    Back := Delay / PERIOD;
-    IF NOT (Back > 0.0) THEN
-        Back := 0.0;
-    END_IF;
-    IF Back > DINT_TO_LREAL(DEPTH - 2) THEN
-        Back := DINT_TO_LREAL(DEPTH - 2);
-    END_IF;
-    Whole := TRUNC(Back);
-    Part := Back - DINT_TO_LREAL(Whole);
-    Near := (Newest - Whole + DEPTH) MOD DEPTH;
-    Far := (Near - 1 + DEPTH) MOD DEPTH;
-    FOR K := 0 TO @last@ DO
-        U := U + Gains[K] * Y[K];
-        U := U + Gains[@outputs@ + K] * ((1.0 - Part) * Past[Near * @outputs@ + K]);
-        U := U + Gains[@outputs@ + K] * (Part * Past[Far * @outputs@ + K]);
-    END_FOR;
-    IF Active < RAMP THEN
-        Active := Active + 1;
-        U := U * DINT_TO_LREAL(Active) / DINT_TO_LREAL(RAMP);
-    END_IF;
-    IF NOT ((U > -1.0E30) AND (U < 1.0E30)) THEN
-        U := 0.0;
-    ELSIF U > LIMIT THEN
-        U := LIMIT;
-    ELSIF U < -LIMIT THEN
-        U := -LIMIT;
-    END_IF;
-ELSE
-    Active := 0;
-END_IF;
-END_FUNCTION_BLOCK
-"""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import re
 import textwrap
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,7 +41,7 @@ class SampledController:
     cell_gains : tuple of float
         Entries of K1, then K2, of the cells with constant gains.
     words : dict of str to str
-        What stands for ``@word@`` in a template.
+        What the templates of all languages name.
     reference : tuple of str
         Lines that say what the table was made for.
     """
@@ -85,7 +83,6 @@ class Sampling(NamedTuple):
 def checked_sampling(
     grid: Grid,
     structure: FeedbackStructure,
-    name: str,
     period: float,
     limit: float,
     ramp: int | None,
@@ -96,7 +93,7 @@ def checked_sampling(
     ----------
     grid, structure : Grid, FeedbackStructure
         Of the table.
-    name, period, limit, ramp
+    period, limit, ramp
         As for `export_c`.
 
     Raises
@@ -106,8 +103,6 @@ def checked_sampling(
     """
     step = checked_number("period", period, 0.0, 1e6, open_low=True)
     bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
-        raise InputError("name", name, "an identifier of at most 31 characters, such as gain_table")
     # The words go into comments, which other names might end.
     known = paper_plant().output_names
     if not set(structure.outputs) <= set(known):
@@ -144,7 +139,7 @@ def sampled_controller(
         As `export_c` does.
     """
     grid, structure, rig = table.grid, table.structure, table.grid.rig
-    step, bound, depth, count = checked_sampling(grid, structure, name, period, limit, ramp)
+    step, bound, depth, count = checked_sampling(grid, structure, period, limit, ramp)
     factors = rig_gain_units(structure, paper_plant(), rig)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
@@ -187,8 +182,3 @@ def sampled_controller(
         words,
         tuple(textwrap.wrap(f"{'Groups' if rig is None else 'Rig (SI)'}: {text}", 80)),
     )
-
-
-def filled(template: str, words: Mapping[str, str]) -> str:
-    """Return a template with ``@word@`` replaced."""
-    return re.sub(r"@(\w+)@", lambda match: words[match[1]], template)

@@ -69,6 +69,7 @@ NODES = ("--omega0", "9:11:2", "--delta0", "1:2:2")
     ("arguments", "said"),
     [
         (("--out", "my-gains.c", "--period", 1, "--limit", 3), "--out = my-gains"),
+        (("--out", "ramp.st", "--period", 1, "--limit", 3), "--out = ramp"),
         (("--out", "g.c", "--period", 1), "--limit = (missing)"),
         (("--out", "g.c", "--period", -1, "--limit", 3), "--period = -1.0"),
         (("--out", "g.c", "--period", 1e-9, "--limit", 3), "--period = 1e-09"),
@@ -109,10 +110,14 @@ def test_a_saved_table_is_drawn_and_exported(capsys, tmp_path):
     )
     assert (status, text, err) == (0, said, "")
     assert again.read_bytes() == saved.read_bytes()
-    direct, later = (["--out", tmp_path / f"{n}.st", "--period", 0.01, "--limit", 5] for n in "ab")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    direct, later = (
+        ["--out", tmp_path / n / "gains.st", "--period", 0.01, "--limit", 5] for n in "ab"
+    )
     run(capsys, "table", *NODES, *direct, "--ramp", 7)
     run(capsys, "table", "--from", saved, *later, "--ramp", 7)
-    assert (tmp_path / "a.st").read_bytes() == (tmp_path / "b.st").read_bytes()
+    assert (tmp_path / "a/gains.st").read_bytes() == (tmp_path / "b/gains.st").read_bytes()
     status, _, err = run(capsys, "table", "--from", saved, "--structure", "pd")
     assert (status, err.split(":")[1]) == (2, " --structure = pd")
     status, _, err = run(capsys, "table", "--from", tmp_path / "none.csv")

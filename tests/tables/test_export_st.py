@@ -1,11 +1,14 @@
 import re
+from pathlib import Path
 
+import blark
 import numpy as np
 import pytest
 from blark.parse import parse_source_code
 
 from drillctrl import Controller, InputError, OperatingPoint, simulate
-from drillctrl.tables.export_st import export_st
+from drillctrl.tables.export_st import VARIABLES, export_st
+from drillctrl.tables.reserved import is_identifier
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 PERIOD, LIMIT = POINT.delay / 16, 3.0
@@ -25,18 +28,18 @@ def to_python(text):
 
     A translation line by line, good for the few statements that the exporter writes.
     """
-    declared, body = text.split("END_VAR\n\nNewest", 1)
+    declared, body = text.split("END_VAR\n\nNewestSample", 1)
     declared = re.sub(r"\(\*.*?\*\)", "", declared, flags=re.DOTALL)
     start = {}
     for name, last, values in re.findall(
         r"(\w+) : ARRAY\[0\.\.(\d+)\] OF \w+(?: := \[(.*?)\])?;", declared, re.DOTALL
     ):
         given = [float(v) for v in values.split(",")] if values else [0.0] * (int(last) + 1)
-        start[name] = [int(v) for v in given] if name == "CellMode" else given
+        start[name] = [int(v) for v in given] if name == "CellKinds" else given
     for name, kind, value in re.findall(r"(\w+) : (L?REAL|DINT|BOOL)(?: := ([^;\[]+))?;", declared):
         start[name] = {"DINT": int, "BOOL": bool}.get(kind, float)(float(value or 0))
     lines, depth = [], 1
-    for raw in ("Newest" + body).splitlines():
+    for raw in ("NewestSample" + body).splitlines():
         line = raw.strip().rstrip(";")
         line = re.sub(r"(?<![:<>])=", "==", line).replace(":=", "=").replace(" MOD ", " % ")
         for word, other in WORDS.items():
@@ -79,9 +82,9 @@ def test_the_block_parses_and_gives_the_simulators_command(small, tmp_path):
     held = run.at(start + (samples + 0.5) * PERIOD).torque
     commanded = []
     for k, y in zip(samples.tolist(), theta.tolist(), strict=True):
-        state.update(Y=[y], Place=[10.0, 2.5, 14.0], Delay=POINT.delay, Enable=k >= 0)
+        state.update(Measured=[y], Place=[10.0, 2.5, 14.0], DelayTime=POINT.delay, Enable=k >= 0)
         step(state)
-        commanded.append(state["U"])
+        commanded.append(state["Command"])
     assert np.abs(held - commanded).max() < 1e-12
     assert state["Vouched"]
     assert any(event.name == "stick" for event in run.events)
@@ -104,14 +107,58 @@ def test_lookup_equals_python(small, on_rig, tmp_path):
             if rig is not None:
                 expected *= rig.torsional_stiffness * np.array([1.0, rig.time_scale] * 2)
             count = len(table.structure.outputs)
-            state.update(Y=[0.0] * count, Place=place.tolist(), Delay=0.1, Enable=False)
+            state.update(Measured=[0.0] * count, Place=place.tolist(), DelayTime=0.1, Enable=False)
             step(state)
-            assert state["Gains"] == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
+            assert state["GainValues"] == pytest.approx(expected.tolist(), rel=1e-10, abs=1e-9)
             assert state["Vouched"] == table.stable_at(*groups)[0]
 
 
+def declared(text):
+    """Return the names that a block gives, its own first."""
+    block = re.search(r"^FUNCTION_BLOCK (\w+)$", text, re.MULTILINE)[1]
+    return [block, *re.findall(r"^    (\w+) : ", text, re.MULTILINE)]
+
+
+def test_no_name_of_the_block_is_a_word_of_the_language_or_a_library(small, on_rig, tmp_path):
+    for table in (small, on_rig):
+        path = export_st(table, tmp_path / "drill_gains.st", period=0.5, limit=1.0)
+        block, *variables = declared(path.read_text())
+        assert block == "drill_gains"
+        assert set(variables) == VARIABLES
+        assert all(is_identifier(name) for name in (block, *variables))
+        assert len({name.upper() for name in (block, *variables)}) == 1 + len(VARIABLES)
+
+
+def test_every_word_that_the_grammar_of_another_parser_keeps_is_known():
+    grammar = (Path(blark.__file__).parent / "iec.lark").read_text(encoding="utf-8")
+    kept = re.search(r"^IDENTIFIER: /\\b\(\?!\(([A-Z_|]+)\)", grammar, re.MULTILINE)[1].split("|")
+    assert len(kept) > 50
+    assert [word for word in kept if is_identifier(word)] == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("LIMIT", "limit", "Ramp", "on", "PID", "Delay", "DINT_TO_LREAL", "R", "IB1", "Ton"),
+        *("a__b", "a_", "_a", "1a", "a-b", "", "x" * 33, "Measured", "command"),
+    ],
+)
+def test_a_file_whose_name_is_none_for_a_block_is_refused(small, tmp_path, name):
+    with pytest.raises(InputError, match="name = "):
+        export_st(small, tmp_path / f"{name}.st", period=0.1, limit=1.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_variables_say_their_units(on_rig, tmp_path):
+    text = export_st(on_rig, tmp_path / "rig.st", period=0.1, limit=500.0).read_text()
+    assert "LREAL; (* Y: theta in rad, dtheta in rad/s *)" in text
+    assert "(* rotary_speed (rad/s), penetration_rate (m/s), rock_strength (Pa) *)" in text
+    assert "Command : LREAL; (* u: N m *)" in text
+    assert "Dialect: IEC 61131-3, second edition" in text
+
+
 def test_bad_input_is_refused(small, tmp_path):
-    for wrong in ({"name": "1x"}, {"period": 0.0}, {"limit": -1.0}):
+    for wrong in ({"period": 0.0}, {"limit": -1.0}):
         with pytest.raises(InputError):
             export_st(small, tmp_path / "t.st", **{"period": 0.1, "limit": 1.0, **wrong})
     assert not list(tmp_path.iterdir())
