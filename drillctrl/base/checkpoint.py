@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
 import json
 from importlib.metadata import version
 from pathlib import Path
@@ -11,12 +13,16 @@ from typing import Any
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import replacing
 
+_LIBRARIES = ("casadi", "numba", "numpy", "scipy")
+# What no result in a checkpoint comes from.
+_ASIDE = ("charts", "cli", "interop", "paper")
+
 
 class Checkpoint:
     """An append-only file of finished results.
 
-    The first line names the version that wrote it, for another may find other results. Each
-    further line names its task by a key, a hash of everything that the result depends on, so
+    The first line is a hash of what computed the results, the package's own sources and the
+    versions of the libraries, for others may find other results. Each further line names its task by a key, a hash of everything that the result depends on, so
     lines of another task are never taken for this one's. A line that was cut short is dropped.
 
     Parameters
@@ -27,8 +33,8 @@ class Checkpoint:
     Raises
     ------
     InputError
-        If the file cannot be read or written, or is none of this version's checkpoints: it is
-        left as it is.
+        If the file cannot be read or written, or is no checkpoint of the same code and libraries:
+        it is left as it is.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -43,7 +49,7 @@ class Checkpoint:
             # A kill may have cut the first line short.
             if not header.startswith(first):
                 self._file.close()
-                raise InputError("checkpoint", str(path), f"a checkpoint of drillctrl {_own()}")
+                raise InputError("checkpoint", str(path), f"a checkpoint of {_own()}")
             if first != header:
                 self._file.truncate(0)
                 self._file.write(header)
@@ -131,11 +137,24 @@ class Checkpoint:
 
 
 def _own() -> str:
-    return version("drillctrl")
+    libraries = ", ".join(f"{name} {version(name)}" for name in _LIBRARIES)
+    return f"drillctrl {version('drillctrl')} as it is installed, with {libraries}"
+
+
+@functools.cache
+def source_digest(package: Path = Path(__file__).parents[1]) -> str:
+    """Return a hash of the sources that results are computed by."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        place = path.relative_to(package)
+        if place.parts[0] not in _ASIDE and not place.stem.endswith("figure"):
+            digest.update(place.as_posix().encode("utf-8") + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def _header() -> bytes:
-    return json.dumps({"drillctrl checkpoint": _own()}).encode("ascii") + b"\n"
+    origin = hashlib.sha256(f"{source_digest()} {_own()}".encode()).hexdigest()[:16]
+    return json.dumps({"drillctrl checkpoint": origin}).encode("ascii") + b"\n"
 
 
 def _line(key: str, result: dict[str, Any]) -> bytes:
