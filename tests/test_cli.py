@@ -296,7 +296,7 @@ def test_public_names_are_all_there():
     assert drillctrl.__all__ == sorted(drillctrl.__all__)
     for name in drillctrl.__all__:
         assert getattr(drillctrl, name).__doc__
-    with pytest.raises(AttributeError, match="no attribute 'invented'"):
+    with pytest.raises(AttributeError, match="invented"):
         drillctrl.invented  # noqa: B018
 
 

@@ -22,8 +22,9 @@ class Checkpoint:
     """An append-only file of finished results.
 
     The first line is a hash of what computed the results, the package's own sources and the
-    versions of the libraries, for others may find other results. Each further line names its task by a key, a hash of everything that the result depends on, so
-    lines of another task are never taken for this one's. A line that was cut short is dropped.
+    versions of the libraries, for others may find other results. Each further line names its
+    task by a key, a hash of everything that the result depends on, so lines of another task are
+    never taken for this one's. A line that was cut short is dropped.
 
     Parameters
     ----------
