@@ -96,11 +96,13 @@ def simulate_command(
     if start not in ("steady", "rest"):
         raise InputError("--start", start, "steady or rest")
     where = read_point(options)
+    from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.export import check_export_path, export_motion
     from drillctrl.simulation.report import simulation_fields, simulation_summary
     from drillctrl.simulation.run import checked_run, simulate
+    from drillctrl.simulation.structure import structure_of
 
     if out is not None:
         check_export_path(out)
@@ -116,12 +118,12 @@ def simulate_command(
         "cutting": cutting,
         "rtol": rtol,
     }
-    checked_run(groups, **common, model=model)
+    checked_run(groups, **common, controller=controller, model=model)
     if figure in ("linear", "face") and model == "linear":
         raise InputError("--figure", figure, "motion or phase for the linear model")
     if figure == "linear":
         checked_run(groups, **common, model="linear")
-    if not is_compiled():
+    if not is_compiled(structure_of(as_case(groups)).physics):
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
 
     def again(model: str) -> Simulation:

@@ -20,7 +20,6 @@ from types import ModuleType
 
 from drillctrl.base.files import write_text
 
-DECORATOR = "@numba.njit(cache=True, error_model='numpy')"
 PACKAGE = "drillctrl.simulation.kernel"
 
 
@@ -42,34 +41,33 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="drillctrl-"))
 
 
-def kernel_sources() -> dict[str, str]:
-    """Return file name → source of the kernel package, with the physics generated."""
+def kernel_sources(physics: str) -> dict[str, str]:
+    """Return file name → source of the kernel package, with the physics that was generated."""
     import numba
-
-    from drillctrl.drilling.branches import branch_functions
-    from drillctrl.simulation.translate import translate_module
 
     sources = {
         item.name: item.read_text(encoding="utf-8")
         for item in sorted(resources.files(PACKAGE).iterdir(), key=lambda item: item.name)
         if item.name.endswith(".py")
     }
-    sources["physics.py"] = translate_module(branch_functions(), DECORATOR)
+    sources["physics.py"] = physics
     # Machine code of another numba must not be taken for this one's.
     sources["__init__.py"] += f"\nNUMBA_VERSION = {numba.__version__!r}\n"
     return sources
 
 
 @functools.cache
-def kernel(name: str) -> ModuleType:
-    """Return a module of the kernel package, generated on first use.
+def kernel(name: str, physics: str) -> ModuleType:
+    """Return a module of the kernel package, compiled for a law on first use.
 
     Parameters
     ----------
     name : str
         Name of the module, such as ``"march"``.
+    physics : str
+        Source of the module of the bit's kinematics and its law; see `Structure.physics`.
     """
-    package = _package()
+    package = _package(physics)
     return importlib.import_module(f"{package}.{name}")
 
 
@@ -79,15 +77,15 @@ def package_name(sources: dict[str, str]) -> str:
     return f"drillctrl_kernel_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
 
-def is_compiled() -> bool:
-    """Whether an earlier run has left machine code in the cache."""
-    folder = cache_folder() / package_name(kernel_sources())
+def is_compiled(physics: str) -> bool:
+    """Whether an earlier run has left machine code for a law in the cache."""
+    folder = cache_folder() / package_name(kernel_sources(physics))
     return any((folder / "__pycache__").glob("march*.nbc"))
 
 
 @functools.cache
-def _package() -> str:
-    sources = kernel_sources()
+def _package(physics: str) -> str:
+    sources = kernel_sources(physics)
     package = package_name(sources)
     folder = cache_folder() / package
     folder.mkdir(mode=0o700, exist_ok=True)

@@ -13,7 +13,6 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.branches import INPUT_NAMES, STATE_NAMES
 from drillctrl.drilling.structures import preset_structure
 
 DELAYS = ("fixed", "current")
@@ -49,7 +48,7 @@ class Controller:
     Attributes
     ----------
     feedback : FeedbackStructure or str
-        Which states are fed back to which inputs; a name as in `preset_structure`.
+        Which outputs are fed back to which inputs; a name as in `preset_structure`.
     K1, K2 : array_like, (m, p) or flat
         Gains on Y(t) and on Y(t − τ).
     activation : float
@@ -69,7 +68,7 @@ class Controller:
         Fastest change of the input: of the actuator if it has a lag, else from sample to
         sample; a continuous command without lag cannot be limited so.
     noise : mapping
-        Standard deviation by state name of the white noise added to each sample.
+        Standard deviation by output name of the white noise added to each sample.
     seed : int
         Of the noise.
     schedule : tuple of (time, K1, K2) or (time, K1, K2, delay)
@@ -125,33 +124,56 @@ class Controller:
         if self.noise and self.period is None:
             raise InputError("noise", dict(self.noise), "left out unless there is a period")
         for name, deviation in self.noise.items():
-            if name not in STATE_NAMES:
-                raise InputError("noise", name, f"of {', '.join(STATE_NAMES)}")
             checked_number(f"noise {name}", deviation, 0.0, 1e9)
-        self.gains()
+        self.gain_sets()
         self.delays(0.0)
 
-    def gains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return when each set of gains starts, and the gains on all states.
+    def gain_sets(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return when each set of gains starts, and the gains of the structure.
 
         Returns
         -------
         times : array, (g,)
-        K1, K2 : array, (g, 2, 4)
-            From the plant's states to its inputs.
+        K1, K2 : array, (g, m, p)
+            From the outputs of the structure to its inputs.
         """
         assert isinstance(self.feedback, FeedbackStructure)
-        rows = [_place("inputs", name, INPUT_NAMES) for name in self.feedback.inputs]
-        columns = [_place("outputs", name, STATE_NAMES) for name in self.feedback.outputs]
         entries = [ScheduleEntry(0.0, self.K1, self.K2), *self._later]
         times = np.zeros(len(entries))
-        full = np.zeros((2, len(entries), len(INPUT_NAMES), len(STATE_NAMES)))
+        shape = len(self.feedback.inputs), len(self.feedback.outputs)
+        gains = np.zeros((2, len(entries), *shape))
         for k, (start, now, past, _) in enumerate(entries):
             times[k] = checked_number("schedule", start, 0.0, 1e9)
             if k and not times[k] > times[k - 1]:
                 raise InputError("schedule", times[: k + 1].tolist(), "at rising times above 0")
             for which, matrix in enumerate(gain_matrices(self.feedback, now, past)):
-                full[which, k][np.ix_(rows, columns)] = matrix
+                gains[which, k] = matrix
+        return times, gains[0], gains[1]
+
+    def gains(
+        self, inputs: tuple[str, ...], outputs: tuple[str, ...]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return `gain_sets` on all outputs of a plant, K1 and K2 of shape (g, m, p).
+
+        Parameters
+        ----------
+        inputs, outputs : tuple of str
+            Names of those of the plant.
+
+        Raises
+        ------
+        InputError
+            If the plant lacks what is fed back, driven or noisy.
+        """
+        assert isinstance(self.feedback, FeedbackStructure)
+        rows = [_place("inputs", name, inputs) for name in self.feedback.inputs]
+        columns = [_place("outputs", name, outputs) for name in self.feedback.outputs]
+        for name in self.noise:
+            _place("noise", name, outputs)
+        times, *sets = self.gain_sets()
+        full = np.zeros((2, times.size, len(inputs), len(outputs)))
+        for which, values in enumerate(sets):
+            full[which][np.ix_(range(times.size), rows, columns)] = values
         return times, full[0], full[1]
 
     def delays(self, usual: float) -> FloatArray:

@@ -70,7 +70,7 @@ def band_energy(
     if span * low < 1.0:
         raise InputError("low", low, f"at least {1.0 / span:.3g} Hz for {span:.3g} s of motion")
     rate = (_SAMPLES - 1) / span
-    motion = run.at(times)
+    motion = run.at(times, ("dx", "dtheta"))
     scales = (rig.axial_scale / rig.time_scale, 1.0 / rig.time_scale)
     energies = []
     for values, scale, mass in zip(

@@ -53,7 +53,7 @@ def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
     from matplotlib.figure import Figure
 
     names = ["x", "bit_speed"]
-    names += [name for name in ("axial", "torque") if name in inputs]
+    names += [name for name in run.input_names if name in inputs]
     figure = Figure(figsize=(7.2, 1.9 * len(names) + 0.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(names), 1, sharex=True)
@@ -76,7 +76,7 @@ def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
     run : Trace
         Of `simulate`.
     name : str
-        A key of `SIGNALS`.
+        A column of the motion, or ``bit_speed``.
     ax : Axes, optional
         By default new ones.
     """
@@ -86,10 +86,10 @@ def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
         for i, (start, end) in enumerate(run.phases(phase) if run.model == "nonlinear" else ()):
             told = label if i == 0 else None
             ax.axvspan(start, end, color=colour, alpha=alpha, linewidth=0, label=told)
-    colour = ORANGE if name in ("axial", "torque") else BLUE
+    colour = ORANGE if name in run.input_names else BLUE
     ax.plot(times, values, color=colour, linewidth=0.9)
     ax.set_xlabel(_TIME)
-    ax.set_ylabel(SIGNALS[name])
+    ax.set_ylabel(SIGNALS.get(name, name))
     ax.margins(x=0)
     return ax
 
@@ -150,7 +150,7 @@ def plot_against_linear(
         Of the same point, controller and disturbance. The linear motion is cut where it
         grows beyond three times the range of the other.
     name : str
-        A key of `SIGNALS`.
+        A column of the motion, or ``bit_speed``.
     ax : Axes, optional
         By default new ones.
     """
@@ -164,9 +164,9 @@ def plot_against_linear(
     if other.min() < low - reach or other.max() > high + reach:
         ax.set_ylim(low - reach, high + reach)
     ax.set_xlabel(_TIME)
-    ax.set_ylabel(SIGNALS[name])
+    ax.set_ylabel(SIGNALS.get(name, name))
     ax.margins(x=0)
-    ax.set_title(f"{SIGNALS[name]} at {_place(nonlinear)}", fontsize="medium")
+    ax.set_title(f"{SIGNALS.get(name, name)} at {_place(nonlinear)}", fontsize="medium")
     ax.legend(loc="best", fontsize="small")
     return ax
 
@@ -207,11 +207,13 @@ def plot_rock_face(run: Trace, time: float | None = None, ax: Axes | None = None
 
 
 def _signal(run: Trace, name: str) -> tuple[Any, Any]:
-    if name not in SIGNALS:
-        raise InputError("signal", name, f"one of {', '.join(SIGNALS)}")
-    motion = run.on_steps(_PER_STEP)
+    known = ["bit_speed", *run.column_names]
+    if name not in known:
+        raise InputError("signal", name, f"one of {', '.join(known)}")
     if name == "bit_speed":
+        motion = run.on_steps(_PER_STEP, names=("dtheta",))
         return run.point.omega0 + motion.dtheta, motion.times
+    motion = run.on_steps(_PER_STEP, names=(name,))
     return getattr(motion, name), motion.times
 
 

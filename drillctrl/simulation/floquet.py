@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.orbits import limit_cycle
-from drillctrl.simulation.past import Past, padded, restrict
+from drillctrl.simulation.past import Past
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.window import perturbation_of, perturbed, window_of
 
-# Nodes of a panel: as many as a quintic has coefficients.
-_NODES = 6
-_PANELS_PER_DELAY = 4.0
 _RTOL = 1e-11
-# Least size of a motion; rest has none.
-_LEAST = 1e-2
 # Errors of an integration, relative to its tolerance.
 _ERROR = 10.0
 
@@ -62,38 +54,6 @@ class Floquet:
         """Modulus of the largest multiplier beside the 1; None if only the 1 was found."""
         others = np.delete(self.multipliers, int(abs(self.multipliers - 1.0).argmin()))
         return float(abs(others).max()) if others.size else None
-
-
-@dataclass(frozen=True, eq=False)
-class _Window:
-    """The part of a past that matters, cut into panels on which perturbations are quintics.
-
-    Attributes
-    ----------
-    past : Past
-        Its steps are cut at the edges of the panels; row 0 is what was before everything.
-    panel : int array, (rows,)
-        The panel that each row lies in; -1 for row 0.
-    begin, length : array, (panels,)
-        Of the panels.
-    stuck, held : bool array, (panels,)
-        Where θ' and x' are known, so that only a shift of θ or x can be a perturbation.
-    scale : tuple
-        Sizes of x and θ in the motion, and of the inputs.
-    """
-
-    past: Past
-    panel: npt.NDArray[np.int64]
-    begin: FloatArray
-    length: FloatArray
-    stuck: npt.NDArray[np.bool_]
-    held: npt.NDArray[np.bool_]
-    scale: tuple[float, float, float]
-
-    @property
-    def times(self) -> FloatArray:
-        """Nodes of all panels, (panels, 6)."""
-        return np.asarray(self.begin[:, None] + self.length[:, None] * _nodes()[0])
 
 
 def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: int = 0) -> Floquet:
@@ -164,7 +124,7 @@ def multipliers_at(
     period, directions, size, seed
         As in `floquet`.
     """
-    window = _window(run, section)
+    window = window_of(run, section)
     controller = run.controller
     if controller is not None:
         controller = dataclasses.replace(controller, activation=0.0)
@@ -172,7 +132,7 @@ def multipliers_at(
 
     def go_on(past: Past, kick: dict[str, float]) -> FloatArray:
         after = simulate(
-            run.point,
+            run.case,
             controller,
             duration=period,
             scenario=Scenario(start=past, initial=kick),
@@ -183,17 +143,17 @@ def multipliers_at(
         )
         if after.status != "done":
             raise InputError("size", size, f"such that a period is not cut short ({after.status})")
-        return _perturbation(after, window, period)
+        return perturbation_of(after, window, period)
 
     def image(perturbation: FloatArray) -> FloatArray:
         ahead, behind = (
-            go_on(_perturbed(window, sign * size * perturbation), {}) for sign in (1.0, -1.0)
+            go_on(perturbed(window, sign * size * perturbation), {}) for sign in (1.0, -1.0)
         )
         return (ahead - behind) / (2.0 * size)
 
     rng = np.random.default_rng(seed)
-    scale = (window.scale[0], window.scale[0], window.scale[1], window.scale[1])
-    names = ("x", "dx", "theta", "dtheta")
+    names = run.state_names
+    scale = window.scale[: len(names)]
     kick = {n: float(size * s * rng.uniform(0.2, 1.0)) for n, s in zip(names, scale, strict=True)}
     opposite = {name: -value for name, value in kick.items()}
     first = (go_on(window.past, kick) - go_on(window.past, opposite)) / (2.0 * size)
@@ -231,126 +191,6 @@ def _quiet_instant(run: Simulation, period: float) -> float:
     if not free.any():
         raise InputError("run", _length(run), "one that turns freely for some of its period")
     return float(middles[np.where(free, np.diff(edges), 0.0).argmax()])
-
-
-def _nodes() -> tuple[FloatArray, FloatArray]:
-    """Return Gauss nodes in (0, 1) and weights."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    return 0.5 * (nodes + 1.0), 0.5 * weights
-
-
-def _reach(run: Simulation, section: float, data: Any) -> float:
-    """Return the earliest instant that the motion after the section depends on."""
-    settings = run._compiled[0]
-    lag = float(max(*settings.lags, settings.gains[:, data.PAST_AGE].max()))
-    earliest = section - lag
-    if run.model == "linear":
-        return earliest
-    start, face = run.history["real"][:, data.START], run.history["whole"][:, data.FACE]
-    # The faces under the blades between here and one pitch back, and what feedback sees there.
-    back = section - float(run.at([section]).delay[0])
-    rows = np.flatnonzero((start >= back - run.point.delay) & (start <= section))
-    earliest = min(earliest, back, float(start[face[rows]].min()))
-    return earliest - lag
-
-
-def _window(run: Simulation, section: float) -> _Window:
-    """Return the steps before an instant that matter, cut into panels."""
-    data = kernel("data")
-    past = run.past(section)
-    start, length = past.real[:, data.START], past.real[:, data.LENGTH]
-    reach = _reach(run, section, data) - section
-    first = max(int(np.searchsorted(start, reach, side="right")) - 1, 1)
-    breaks = start[first:][past.whole[first:, data.LEVEL] <= data.LAST_LEVEL]
-    pieces = np.unique([start[first], *breaks, 0.0])
-    longest = run.point.delay / _PANELS_PER_DELAY
-    edges = np.concatenate(
-        [np.linspace(a, b, max(int(np.ceil((b - a) / longest)), 1) + 1)[:-1]
-         for a, b in itertools.pairwise(pieces)]
-    )  # fmt: skip
-    real, whole, panel = [past.real[0]], [past.whole[0]], [-1]
-    for j in range(first, len(start)):
-        end = start[j + 1] if j + 1 < len(start) else 0.0
-        cuts = edges[(edges > start[j] + 1e-9) & (edges < end - 1e-9)]
-        corners = [start[j], *cuts, start[j] + length[j]]
-        for i, (a, b) in enumerate(itertools.pairwise(corners)):
-            row, kind = past.real[j].copy(), past.whole[j].copy()
-            restrict(row, (a - start[j]) / length[j], (b - start[j]) / length[j])
-            row[data.START] = a
-            if i > 0:
-                kind[data.LEVEL] = data.LAST_LEVEL + 1
-            # Places of steps have moved; the march finds them anew.
-            kind[data.LAG] = kind[data.FACE] = 0
-            real.append(row)
-            whole.append(kind)
-            panel.append(int(np.searchsorted(edges, a + 1e-9, side="right")) - 1)
-    panels = np.array(panel, dtype=np.int64)
-    kinds = np.array(whole)
-    nonlinear = run.model == "nonlinear"
-    at_first = [int(np.flatnonzero(panels == i)[0]) for i in range(edges.size)]
-    stuck = nonlinear & (kinds[at_first, data.TORSION] == data.STUCK)
-    held = nonlinear & (kinds[at_first, data.AXIAL] == data.HELD)
-    held &= kinds[at_first, data.CONTACT] == 1
-    tail = run.on_steps(5, max(section - 10.0 * run.point.delay, 0.5 * float(run.times[-1])))
-    size_x, size_theta = (max(float(np.ptp(v)), _LEAST) for v in (tail.x, tail.theta))
-    size_u = max(float(np.ptp(tail.axial)), float(np.ptp(tail.torque)), _LEAST)
-    return _Window(
-        dataclasses.replace(past, real=np.array(real), whole=kinds),
-        panels,
-        edges,
-        np.diff(np.append(edges, 0.0)),
-        stuck,
-        held,
-        (size_x, size_theta, size_u),
-    )
-
-
-def _perturbation(after: Simulation, window: _Window, time: float) -> FloatArray:
-    """Return the signals on the window ending at an instant, scaled so that the norm is L2."""
-    data = kernel("data")
-    real = after.history["real"]
-    times = time + window.times
-    j = np.clip(np.searchsorted(real[:, data.START], times, side="right") - 1, 1, None)
-    s = (times - real[j, data.START]) / real[j, data.LENGTH]
-    roots = np.sqrt(window.length[:, None] * _nodes()[1])
-    parts = []
-    for begin, known, scale in zip(
-        (data.X, data.THETA), (window.held, window.stuck), window.scale, strict=False
-    ):
-        values = sum(real[j, begin + i] * s**i for i in range(6)) / scale
-        shift = (values * _nodes()[1]).sum(axis=1, keepdims=True)
-        parts.append(roots * np.where(known[:, None], shift, values))
-    end = after.at([time])
-    inputs = np.array([end.axial[0], end.torque[0]]) / window.scale[2]
-    if after.controller is None or not after.controller.actuator_lag:
-        inputs[:] = 0.0
-    return np.concatenate([*(part.ravel() for part in parts), inputs])
-
-
-def _perturbed(window: _Window, perturbation: FloatArray) -> Past:
-    """Return the past with a perturbation added."""
-    data = kernel("data")
-    nodes, weights = _nodes()
-    panels = window.begin.size
-    roots = np.sqrt(window.length[:, None] * weights)
-    to_powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
-    real, state = window.past.real.copy(), window.past.state.copy()
-    end = window.past.real[:, data.START] + window.past.real[:, data.LENGTH]
-    for k, begin in enumerate((data.X, data.THETA)):
-        values = perturbation[k * panels * _NODES : (k + 1) * panels * _NODES]
-        powers = (values.reshape(panels, _NODES) / roots * window.scale[k]) @ to_powers
-        powers[(window.held, window.stuck)[k], 1:] = 0.0
-        for j in range(1, len(real)):
-            i = window.panel[j]
-            low, high = (
-                (t - window.begin[i]) / window.length[i] for t in (real[j, data.START], end[j])
-            )
-            part = np.polynomial.Polynomial(powers[i])(np.polynomial.Polynomial([low, high - low]))
-            real[j, begin : begin + 6] += padded(part, 6)
-        state[2 * k] += powers[-1].sum()
-        state[2 * k + 1] += powers[-1] @ np.arange(6) / window.length[-1]
-    state[4:] += perturbation[-2:] * window.scale[2]
-    return dataclasses.replace(window.past, real=real, state=state)
 
 
 def _arnoldi(

@@ -9,18 +9,13 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.branches import (
-    branch_functions,
-    dimensionless_plant,
-    linear_depth,
-    linearisation,
-    parameter_vector,
-)
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.kernel import data
 from drillctrl.simulation.past import Past
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.structure import Structure
 
 FIRST_ROOM = 4096
 MAX_SAMPLES = 10_000_000
@@ -44,146 +39,175 @@ class March(NamedTuple):
 
 
 def settings_for(
-    point: OperatingPoint,
+    structure: Structure,
     controller: Controller | None,
-    scenario: Scenario,
+    drive: FloatArray,
     *,
     duration: float,
     linear: bool,
     multiple: bool,
     rtol: float,
     atol: float,
-) -> Any:
-    """Return the `Settings` of a run."""
-    data = kernel("data")
-    p = parameter_vector(point)
-    a1, a2, b, _ = (value.full() for value in linearisation(dimensionless_plant())(p))
-    linear_rows = np.zeros((5, 10))
-    linear_rows[:4] = np.hstack([a1, a2, b])
-    linear_rows[4, :8] = linear_depth()(p).full().ravel()
-    linear_rows[4, 8] = 2.0 * np.pi * point.delta0
-    flags = np.zeros(7, dtype=np.int64)
-    flags[data.LINEAR], flags[data.MULTIPLE] = linear, multiple
-    control = np.zeros(4)
-    limit, rate, lags = np.full(2, np.inf), np.full(2, np.inf), np.zeros(2)
-    times, K1, K2 = np.zeros(1), np.zeros((1, 2, 4)), np.zeros((1, 2, 4))
-    noise, ages = np.zeros((0, 4)), np.zeros(1)
+) -> data.Settings:
+    """Return the `Settings` of a run; ``drive`` is as `Scenario.drive` returns it."""
+    arrays = structure.arrays
+    n, m = arrays.B.shape
+    p = len(structure.output_names)
+    whole, real = np.zeros(data.ROWS, dtype=np.int64), np.zeros(data.LIMITS + 2 * m)
+    whole[[data.STATES, data.INPUTS, data.OUTPUTS]] = n, m, p
+    whole[data.LINEAR], whole[data.MULTIPLE] = linear, multiple
+    real[[data.WEIGHT, data.TORQUE]] = arrays.steady
+    real[data.CUT] = structure.steady_depth
+    real[[data.BY_WEIGHT, data.BY_TORQUE]] = arrays.E[1, 0], arrays.E[3, 1]
+    real[[data.RTOL, data.ATOL]] = rtol, atol
+    real[data.SCALE : data.LIMITS] = _scales(structure)
+    real[data.LIMITS :] = np.inf
+    schedule, K1, K2 = np.zeros((1, 2)), np.zeros((1, m, p)), np.zeros((1, m, p))
+    fed, noise = np.zeros(0, dtype=np.int64), np.zeros((0, p))
     if linear:
-        lags[0] = point.delay
+        real[data.LAGS] = structure.delay
     if controller is not None:
-        times, K1, K2 = controller.gains()
-        past, ages = bool(K2.any()), controller.delays(point.delay)
-        sampled = controller.period is not None
+        times, K1, K2 = controller.gains(structure.input_names, structure.output_names)
+        past, ages = bool(K2.any()), controller.delays(structure.delay)
         current = controller.delay == "current" and not linear
-        flags[data.FEEDBACK] = 1
-        flags[data.CURRENT_DELAY] = current and past
-        flags[data.SAMPLED] = sampled
-        flags[data.ACTUATOR] = controller.actuator_lag > 0.0
-        flags[data.RATE_FEEDBACK] = bool(K1[:, :, [1, 3]].any() or K2[:, :, [1, 3]].any())
-        control[data.T_ON] = controller.activation
-        control[data.MEASURE_DELAY] = controller.measurement_delay
-        control[data.LAG_TIME] = controller.actuator_lag
+        fed = np.flatnonzero(np.concatenate([K1, K2]).any(axis=(0, 1)))
+        whole[data.FEEDBACK] = 1
+        whole[data.PAST] = past
+        whole[data.CURRENT_DELAY] = current and past
+        whole[data.SAMPLED] = controller.period is not None
+        whole[data.ACTUATOR] = controller.actuator_lag > 0.0
+        whole[data.RATE_FEEDBACK] = _rough(structure)[fed].any()
+        real[data.T_ON] = controller.activation
+        real[data.MEASURE_DELAY] = controller.measurement_delay
+        real[data.LAG_TIME] = controller.actuator_lag
         if controller.limit is not None:
-            limit[:] = controller.limit
+            real[data.LIMITS : data.LIMITS + m] = controller.limit
         if controller.rate_limit is not None:
-            rate[:] = controller.rate_limit
+            real[data.LIMITS + m :] = controller.rate_limit
         if controller.period is not None:
-            control[data.PERIOD] = controller.period
-            noise = _noise(controller, duration)
+            real[data.PERIOD] = controller.period
+            noise = _noise(controller, structure.output_names, duration)
         else:
-            lags[1] = controller.measurement_delay
+            real[data.LAGS + 1] = controller.measurement_delay
             reach = past and not current
             ages = controller.measurement_delay + ages if reach else np.zeros_like(ages)
+        schedule = np.column_stack([times, ages])
+    index, value = _rows(structure, linear)
+    whole[data.FED] = data.ROWS + index.size
     return data.Settings(
-        p=tuple(p.tolist()),
-        flags=tuple(flags.tolist()),
-        control=tuple(control.tolist()),
-        limit=tuple(limit.tolist()),
-        rate=tuple(rate.tolist()),
-        gains=np.column_stack([times, K1.reshape(-1, 8), K2.reshape(-1, 8), ages]),
-        drive=scenario.drive(point),
-        linear=linear_rows,
-        lags=tuple(lags.tolist()),
-        noise=noise,
-        tolerance=(rtol, atol),
-        scale=tuple(_scales(point, limit, rate).tolist()),
+        q=tuple(arrays.q.tolist()),
+        whole=np.concatenate([whole, index, fed]),
+        real=real,
+        value=value,
+        schedule=schedule,
+        gains=np.ascontiguousarray(np.stack([K1, K2])[..., fed]),
+        drive=drive,
+        noise=np.ascontiguousarray(noise[:, fed]),
     )
 
 
-def _noise(controller: Controller, duration: float) -> FloatArray:
+def _rows(structure: Structure, linear: bool) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Return what `Settings.whole` has from ROWS on, and `Settings.value`."""
+    string = structure.arrays
+    n, m = string.B.shape
+    p = len(structure.output_names)
+    rows = np.zeros((n + p + 1, data.vector_length(n, m)))
+    inputs, top, load = n + 2 * m, n + 3 * m, n + 3 * m + 4
+    rows[:n, :n], rows[:n, inputs:top], rows[:n, top:load] = string.A, string.B, string.T
+    rows[:n, load:] = string.E
+    rows[n : n + p, :n], rows[n : n + p, top:load] = string.C, -string.R
+    if linear:
+        rows[:n, :n], rows[:n, top:load] = string.linear, string.linear_delayed
+        rows[:n, load:] = rows[n : n + p, top:load] = 0.0
+        rows[-1, :4], rows[-1, top:load] = string.depth[:4], string.depth[4:8]
+    place, column = np.nonzero(rows)
+    count = n + p + 2
+    start = data.ROWS + count
+    index = np.concatenate([start + np.searchsorted(place, np.arange(count)), column])
+    return index.astype(np.int64), np.concatenate([np.zeros(start), rows[place, column]])
+
+
+def _rough(structure: Structure) -> npt.NDArray[np.bool_]:
+    """Which outputs have a rate that jumps where a load, an input or the drive does, (p,)."""
+    string = structure.arrays
+    jumps = np.hstack([string.E, string.B, string.T])
+    return np.asarray((string.C @ jumps != 0.0).any(axis=1))
+
+
+def _noise(controller: Controller, names: tuple[str, ...], duration: float) -> FloatArray:
     assert controller.period is not None
     count = max(0.0, (duration - controller.activation) / controller.period) + 2.0
     if count > MAX_SAMPLES:
         shortest = f"at least {duration / MAX_SAMPLES:.3g} for this duration"
         raise InputError("period", controller.period, shortest)
-    deviation = np.array(
-        [controller.noise.get(name, 0.0) for name in dimensionless_plant().state_names]
-    )
+    deviation = np.array([controller.noise.get(name, 0.0) for name in names])
     if not deviation.any():
-        return np.zeros((0, 4))
+        return np.zeros((0, len(names)))
     generator = np.random.default_rng(controller.seed)
-    draws: FloatArray = deviation * generator.normal(size=(int(count), 4))
+    draws: FloatArray = deviation * generator.normal(size=(int(count), len(names)))
     return draws
 
 
-def _scales(point: OperatingPoint, limit: FloatArray, rate_limit: FloatArray) -> FloatArray:
-    """Size of each event function at the point, in the order of the kinds of event."""
-    assert point.lam is not None
-    depth = max(2.0 * np.pi * point.delta0, 1e-3)
-    torque = depth + point.beta + 1.0
-    force = point.psi * depth + point.lam + 1.0
-    rate = max(point.penetration_rate, 1e-3)
-    scales = [point.omega0, torque, torque, rate, force, force, depth, *limit, *rate_limit]
-    return np.where(np.isfinite(scales), scales, 1.0)
+def _scales(structure: Structure) -> tuple[float, ...]:
+    """Size of each event function but the limits, in the order of the kinds of event."""
+    string = structure.arrays
+    force, moment = np.abs([string.E[1, 0], string.E[3, 1]]) * string.steady + 1.0
+    rate, depth = max(structure.penetration_rate, 1e-3), max(structure.steady_depth, 1e-3)
+    scales = structure.omega0, moment, moment, rate, force, force, depth, 1.0, 1.0
+    return tuple(float(scale) for scale in scales)
 
 
-def empty_history(room: int) -> Any:
+def empty_history(room: int, states: int, inputs: int) -> data.History:
     """Return a `History` with room for so many steps."""
-    data = kernel("data")
-    real = np.zeros((room, data.REALS))
+    real = np.zeros((room, data.history_width(states, inputs)))
     return data.History(real, np.zeros((room, data.WHOLES), dtype=np.int64))
 
 
-def resized(history: Any, room: int, used: int) -> Any:
+def resized(history: data.History, room: int, used: int) -> data.History:
     """Return a copy of a history with other room."""
     copies = []
     for old in history:
         new = np.zeros((room, *old.shape[1:]), dtype=old.dtype)
         new[:used] = old[:used]
         copies.append(new)
-    return type(history)(*copies)
+    return data.History(*copies)
 
 
-def check_start(point: OperatingPoint, scenario: Scenario, linear: bool) -> None:
+def check_start(
+    point: OperatingPoint, structure: Structure, scenario: Scenario, linear: bool
+) -> None:
     """Refuse a start that the model does not cover.
 
     Raises
     ------
     InputError
-        If the bit would start turning backwards, the linear model from rest, or a run from
-        the past of another operating point or model.
+        If a perturbed state is unknown, the bit would start turning backwards, the linear
+        model from rest, or a run from the past of another point, plant or model.
     """
+    kick = scenario.perturbation(structure.state_names)
     start = scenario.start
-    low = -point.omega0
+    low = -structure.omega0
     if isinstance(start, Past):
         if start.point != point:
             raise InputError("start", repr(start), f"a past of {point!r}, not of {start.point!r}")
+        if not structure.is_same(start.structure):
+            raise InputError("start", repr(start), "a past of the same plant")
         if (start.model == "linear") != linear:
             raise InputError("model", "linear" if linear else "nonlinear", "that of the past")
         low -= float(start.state[3])
     elif start == "rest":
         if linear:
             raise InputError("start", "rest", "steady for the linear model")
+        _ = structure.rest  # refused here where there is none
         low = 0.0
-    kick = scenario.perturbation()[3]
-    if not linear and kick < low:
-        raise InputError("initial dtheta", kick, f"at least {low:g}: the bit must not turn back")
+    if not linear and kick[3] < low:
+        raise InputError("initial dtheta", kick[3], f"at least {low:g}: the bit must not turn back")
 
 
 def begin(
-    point: OperatingPoint,
+    structure: Structure,
     controller: Controller | None,
-    settings: Any,
+    settings: data.Settings,
     scenario: Scenario,
     room: int = FIRST_ROOM,
 ) -> March:
@@ -193,64 +217,76 @@ def begin(
     is any motion with constant Z; the delay it implies is that of steady drilling); and the
     steps of a run that is gone on from. The start has passed `check_start`.
     """
-    march, control = kernel("march"), kernel("control")
+    march, control = (kernel(name, structure.physics) for name in ("march", "control"))
     standing = (
-        _resume(scenario.start, settings, room)
+        _resume(scenario.start, structure, settings, room)
         if isinstance(scenario.start, Past)
-        else _set_off(point, settings, scenario.start, room)
+        else _set_off(structure, settings, scenario.start, room)
     )
     _, history, ints, reals, y, chain, _, first = standing
-    kick = scenario.perturbation()
-    y[:4] += kick
+    n, m = structure.arrays.B.shape
+    kick = scenario.perturbation(structure.state_names)
+    y[:n] += kick
     if kick[1]:
-        ints[march.I_AXIAL] = kernel("data").DOWN
+        ints[march.I_AXIAL] = data.DOWN
     if kick[3]:
-        ints[march.I_TORSION] = kernel("data").FORWARD
-    if kick[0] or kick[2]:
+        ints[march.I_TORSION] = data.FORWARD
+    if kick[0] or kick[2] or kick[4:].any():
         ints[march.I_LEVEL] = 0
-    reals[march.STEP] = 1e-2 * point.delay
-    reals[march.NEXT_SAMPLE] = settings.control[kernel("data").T_ON]
+    reals[march.STEP] = 1e-2 * structure.delay
+    reals[march.NEXT_SAMPLE] = settings.real[data.T_ON]
     if controller is not None and controller.activation == 0.0:
         # What the drive gives at this instant is where its limits of rate begin.
-        reals[[march.HELD0, march.HELD1]] = y[4:]
-    control.take_sample(settings, history, first, ints, reals, 0.0)
-    march.enter(settings, history, first, ints, reals, chain, kernel("data").BEGIN, 0.0, y)
+        y[n + m : n + 2 * m] = y[n : n + m]
+    control.take_sample(settings, history, first, ints, reals, 0.0, y)
+    work = march.workplace(settings)
+    march.enter(settings, history, first, ints, chain, data.BEGIN, 0.0, y, work)
     return standing
 
 
-def _blank(settings: Any, room: int) -> March:
+def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march before anything."""
-    data, march = kernel("data"), kernel("march")
+    march = kernel("march", structure.physics)
+    n, m = structure.arrays.B.shape
     chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
     following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
-    ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(5)
+    ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(3)
     ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
-    return March(settings, empty_history(room), ints, reals, np.zeros(6), chain, following, 1)
+    y = np.zeros(data.vector_length(n, m))
+    return March(settings, empty_history(room, n, m), ints, reals, y, chain, following, 1)
 
 
-def _set_off(point: OperatingPoint, settings: Any, start: str, room: int) -> March:
+def _set_off(structure: Structure, settings: data.Settings, start: str, room: int) -> March:
     """Return a march after steady drilling, or with a bit at rest."""
-    data = kernel("data")
-    standing = _blank(settings, room)
+    standing = _blank(structure, settings, room)
     before, y = standing.history.real[0], standing.y
     before[[data.START, data.LENGTH]] = -1.0, 1.0
     if start == "rest":
-        y[[0, 2]] = branch_functions()[-1](np.array(settings.p)).full().ravel()
-        before[data.X : data.X + 2] = y[0] + point.penetration_rate, -point.penetration_rate
+        n = len(structure.rest)
+        y[:n] = structure.rest
+        # Until then all moves as one against the frame of steady drilling.
+        top = np.array([0.0, -structure.penetration_rate, 0.0, -structure.omega0])
+        string = structure.arrays
+        rate = string.A @ y[:n] - string.E @ string.steady + string.T @ top
+        before[data.X : data.X + 2] = y[0] - rate[0], rate[0]
         before[data.THETA] = y[2]
-        y[[1, 3]] = -point.penetration_rate, -point.omega0
+        for i in range(4, n):
+            column = data.OTHERS + data.QUARTIC * (i - 4)
+            before[column : column + 2] = y[i] - rate[i], rate[i]
     standing.history.whole[0, [data.CONTACT, data.PASSES]] = 1
     return standing
 
 
-def _resume(past: Past, settings: Any, room: int) -> March:
+def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march that goes on from what another has left behind."""
-    data, march, breaks = kernel("data"), kernel("march"), kernel("breaks")
+    march, breaks, model, interpolate = (
+        kernel(name, structure.physics) for name in ("march", "breaks", "model", "interpolate")
+    )
     steps = len(past.real)
-    standing = _blank(settings, steps + room)._replace(first=steps)
+    standing = _blank(structure, settings, steps + room)._replace(first=steps)
     _, history, ints, _, y, chain, following, _ = standing
     history.real[:steps], history.whole[:steps] = past.real, past.whole
-    y[:] = past.state
+    y[: past.state.size] = past.state
     last = past.whole[-1]
     ints[march.STEPS] = steps
     ints[march.I_CONTACT] = last[data.CONTACT]
@@ -258,9 +294,9 @@ def _resume(past: Past, settings: Any, room: int) -> March:
     # Another controller takes over: its torque need not continue the one before.
     ints[march.I_LEVEL] = 2
     for i in range(3):
-        lag = kernel("model").lag_of(settings, i, 0)
+        lag = model.lag_of(settings, i, 0)
         if lag > 0.0:
-            ints[march.LAG0 + i] = kernel("interpolate").step_at(history, steps, -lag)
+            ints[march.LAG0 + i] = interpolate.step_at(history, steps, -lag)
     if past.model == "nonlinear":
         where = settings, history, steps, chain, following, 0.0, y[2]
         ints[march.I_PASSES] = breaks.retrace(*where, 1e-13 * (1.0 + abs(y[2])))

@@ -10,7 +10,6 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.branches import STATE_NAMES
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
@@ -91,12 +90,11 @@ def limit_cycle(run: Simulation, since: float = 0.0) -> LimitCycle | None:
 
 def _states(run: Simulation, times: FloatArray) -> FloatArray:
     """Return the states at some instants, each scaled by its range over the end of the run."""
-    motion = run.at(times)
-    tail = run.on_steps(9, 0.75 * float(run.times[-1]))
-    sizes = [max(float(np.ptp(getattr(tail, name))), 1e-300) for name in STATE_NAMES]
-    return np.stack(
-        [getattr(motion, name) / size for name, size in zip(STATE_NAMES, sizes, strict=True)]
-    )
+    names = run.state_names
+    motion = run.at(times, names)
+    tail = run.on_steps(9, 0.75 * float(run.times[-1]), names)
+    sizes = [max(float(np.ptp(getattr(tail, name))), 1e-300) for name in names]
+    return np.stack([getattr(motion, name) / size for name, size in zip(names, sizes, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +169,9 @@ def separation(
         if run.status != "done":
             raise InputError("duration", duration, f"before the run ends with {run.status}")
     times = np.linspace(0.5 * duration, duration, 4001)
-    states = [np.stack([getattr(run.at(times), name) for name in STATE_NAMES]) for run in runs]
+    names = runs[0].state_names
+    motions = [run.at(times, names) for run in runs]
+    states = [np.stack([getattr(motion, name) for name in names]) for motion in motions]
     distance = np.linalg.norm(states[1] - states[0], axis=0)
     motion = float(np.linalg.norm(np.ptp(states[0], axis=1)))
     reach = max(motion, float(distance.max()))

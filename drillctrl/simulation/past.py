@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,8 @@ from numpy.polynomial import Polynomial
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.kernel import data
+from drillctrl.simulation.structure import Structure
 
 if TYPE_CHECKING:
     from drillctrl.simulation.trace import Trace
@@ -29,15 +30,18 @@ class Past:
     ----------
     point : OperatingPoint
         Where the rig drilled.
+    structure : Structure
+        What drilled.
     model : str
         Of the run that it was taken from.
-    state : array, (6,)
-        x, x', θ, θ' and both inputs at the instant.
+    state : array, (n + m,)
+        States and inputs at the instant.
     real, whole : array
         Steps of the integrator up to the instant, as in its history; times end at 0.
     """
 
     point: OperatingPoint
+    structure: Structure
     model: str
     state: FloatArray
     real: FloatArray
@@ -69,41 +73,54 @@ def past_of(run: Trace, time: float | None = None, changed: float | None = None)
     when = end if time is None else checked_number("time", time, 0.0, end)
     if changed is not None and changed < when:
         raise InputError("time", when, f"at most {changed:g}, where the rig is changed")
-    data = kernel("data")
-    history: dict[str, Any] = dict(run.history)
-    start = history["real"][:, data.START]
+    history = run.history
+    start = history.real[:, data.START]
+    names = (*run.state_names, *run.input_names)
+    motion = run.at([when], names)
+    state = np.array([float(getattr(motion, name)[0]) for name in names])
     last = int(np.searchsorted(start, when, side="left"))
     first = run.first
     last = max(last, first)
-    real, whole = history["real"][:last].copy(), history["whole"][:last].copy()
+    real, whole = history.real[:last].copy(), history.whole[:last].copy()
     if last > first:
         begun, length = real[-1][[data.START, data.LENGTH]]
-        restrict(real[-1], 0.0, (when - begun) / length)
+        restrict(real[-1], 0.0, (when - begun) / length, len(names))
     real[:, data.START] -= when
-    motion = run.at([when])
-    columns = (motion.x, motion.dx, motion.theta, motion.dtheta, motion.axial, motion.torque)
-    state = np.array([float(column[0]) for column in columns])
-    return Past(run.point, run.model, state, real, whole)
+    return Past(run.point, run.structure, run.model, state, real, whole)
 
 
-def restrict(row: FloatArray, low: float, high: float) -> None:
+def restrict(row: FloatArray, low: float, high: float, signals: int) -> None:
     """Keep the part of a step between two places on it, in place; its motion stays the same.
 
     Parameters
     ----------
-    row : array, (REALS,)
+    row : array
         A step of the history.
     low, high : float
         In [0, 1], from its start to its end.
+    signals : int
+        Number of states and inputs, n + m.
     """
-    data = kernel("data")
     share = high - low
     row[data.START] += low * row[data.LENGTH]
     row[data.LENGTH] *= share
-    actuators = data.ACTUATORS
-    for begin, count in ((data.X, 6), (data.THETA, 6), (actuators, 4), (actuators + 4, 4)):
-        part = Polynomial(row[begin : begin + count])
-        row[begin : begin + count] = padded(part(Polynomial([low, share])), count)
+    others = data.OTHERS + data.QUARTIC * (signals - 4)
+    for begin, end, count in (
+        (data.X, data.OTHERS, data.QUINTIC),
+        (data.OTHERS, others, data.QUARTIC),
+    ):
+        part = row[begin:end].reshape(-1, count)
+        part[:] = part @ _shifted_powers(low, share, count)
+
+
+def _shifted_powers(low: float, share: float, count: int) -> FloatArray:
+    """Return the matrix whose row k has the coefficients of (low + share s)^k, (count, count)."""
+    powers = np.zeros((count, count))
+    power = Polynomial([1.0])
+    for k in range(count):
+        powers[k] = padded(power, count)
+        power = power * Polynomial([low, share])
+    return powers
 
 
 def padded(polynomial: Polynomial, count: int) -> FloatArray:

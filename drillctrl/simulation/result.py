@@ -103,12 +103,16 @@ class Simulation(Trace):
         import control
 
         motion = self.motion
+        states, inputs = (
+            [getattr(motion, name) for name in names]
+            for names in (self.state_names, self.input_names)
+        )
         return control.TimeResponseData(
             motion.times,
-            np.stack([motion.x, motion.dx, motion.theta, motion.dtheta]),
-            inputs=np.stack([motion.axial, motion.torque]),
+            np.stack(states),
+            inputs=np.stack(inputs),
             issiso=False,
-            output_labels=["x", "dx", "theta", "dtheta"],
-            input_labels=["axial", "torque"],
+            output_labels=list(self.state_names),
+            input_labels=list(self.input_names),
             sysname="drill_string",
         )

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.kernel import data
 from drillctrl.simulation.trace import Trace
 
 _MOST_PASSES = 64
@@ -90,8 +90,7 @@ def _face(run: Trace, angles: FloatArray, until: float) -> tuple[FloatArray, npt
 
     Steps before t = 0 count as well; the first of all is uniform motion without end.
     """
-    data = kernel("data")
-    real, whole = run.history["real"], run.history["whole"]
+    real, whole = run.history
     rows = int(np.searchsorted(real[:, data.START], until, side="right"))
     real, spin = real[:rows], run.point.omega0
 

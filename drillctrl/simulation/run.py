@@ -7,12 +7,14 @@ import time
 from collections.abc import Mapping
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.kernel import data
 from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, resized, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.structure import Structure, structure_of
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
@@ -20,9 +22,11 @@ LONGEST = 1e6
 
 
 def checked_run(
-    point: OperatingPoint,
+    where: Where,
     scenario: Scenario | None = None,
     *,
+    structure: Structure | None = None,
+    controller: Controller | None = None,
     duration: float,
     initial: Mapping[str, float] | None = None,
     model: str = "nonlinear",
@@ -38,8 +42,10 @@ def checked_run(
 
     Parameters
     ----------
-    point, scenario, duration, initial, model, cutting, rtol, atol, max_step, max_steps
-        As in `simulate`.
+    where, scenario, duration, initial, model, cutting, rtol, atol, max_step, max_steps
+        As in `simulate`, and so is ``controller``.
+    structure : Structure, optional
+        That of the case.
 
     Raises
     ------
@@ -63,12 +69,17 @@ def checked_run(
     linear = model == "linear"
     if linear and scenario.changes:
         raise InputError("changes", len(scenario.changes), "left out for the linear model")
-    check_start(point, scenario, linear)
+    case = as_case(where)
+    _, point = case.physics("a simulation")
+    structure = structure_of(case) if structure is None else structure
+    check_start(point, structure, scenario, linear)
+    if controller is not None:
+        controller.gains(structure.input_names, structure.output_names)
     return scenario, duration, rtol, atol, max_steps
 
 
 def simulate(
-    point: OperatingPoint | RigPoint,
+    where: Where,
     controller: Controller | None = None,
     *,
     duration: float = 200.0,
@@ -85,9 +96,9 @@ def simulate(
 
     Parameters
     ----------
-    point : OperatingPoint or RigPoint
-        Where the rig drills at the start. All else is dimensionless either way; the result
-        of a `RigPoint` can be read in rig units.
+    where : OperatingPoint, RigPoint or Case
+        What drills, and where at the start; a point alone means the paper's plant. All else
+        is dimensionless either way; the result of a `RigPoint` can be read in rig units.
     controller : Controller, optional
         Torque (or axial) feedback.
     duration : float
@@ -126,12 +137,14 @@ def simulate(
     cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
     over what it had cut already.
     """
-    rig = point.rig if isinstance(point, RigPoint) else None
-    if isinstance(point, RigPoint):
-        point = point.operating_point()
+    case = as_case(where)
+    _, point = case.physics("a simulation")
+    structure = structure_of(case)
     scenario, duration, rtol, atol, max_steps = checked_run(
-        point,
+        case,
         scenario,
+        structure=structure,
+        controller=controller,
         duration=duration,
         initial=initial,
         model=model,
@@ -143,17 +156,17 @@ def simulate(
     )
     linear = model == "linear"
     settings = settings_for(
-        point,
+        structure,
         controller,
-        scenario,
+        scenario.drive(point),
         duration=duration,
         linear=linear,
         multiple=cutting == "multiple",
         rtol=rtol,
         atol=atol,
     )
-    standing = begin(point, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1))
-    march, data = kernel("march"), kernel("data")
+    standing = begin(structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1))
+    march = kernel("march", structure.physics)
     status = {
         data.DONE: "done",
         data.COLLAPSE: "step collapse",
@@ -172,7 +185,7 @@ def simulate(
     elapsed = time.perf_counter() - started
     history = resized(standing.history, used, used)
     return Simulation(
-        point=point,
+        case=case,
         controller=controller,
         scenario=scenario,
         model=model,
@@ -184,8 +197,9 @@ def simulate(
         rejected=int(standing.ints[march.REJECTED]),
         evaluations=int(standing.ints[march.EVALUATIONS]),
         elapsed_seconds=elapsed,
-        settings=settings._asdict(),
-        history=history._asdict(),
+        structure=structure,
+        settings=settings,
+        history=history,
         first=standing.first,
-        rig=rig,
+        rig=case.rig,
     )

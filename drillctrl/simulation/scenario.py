@@ -10,7 +10,6 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.branches import STATE_NAMES
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.past import Past
 
@@ -65,7 +64,7 @@ class Scenario:
         Steady drilling until t = 0; or a bit at rest that just touches flat rock, unloaded,
         whose top end sets off at t = 0; or what another run left behind (`Simulation.past`).
     initial : mapping
-        Perturbation by state name (x, dx, theta, dtheta) that is added at t = 0.
+        Perturbation by state name (x, dx, theta, dtheta of the bit) that is added at t = 0.
     changes : tuple of Change
         In order of time, none starting before the one before it is complete.
 
@@ -83,8 +82,6 @@ class Scenario:
         if not isinstance(self.start, Past) and self.start not in STARTS:
             raise InputError("start", self.start, f"one of {', '.join(STARTS)}, or a Past")
         for name, value in self.initial.items():
-            if name not in STATE_NAMES:
-                raise InputError("initial", name, f"one of {', '.join(STATE_NAMES)}")
             checked_number(f"initial {name}", value, -1e6, 1e6)
         changes = tuple(self.changes)
         object.__setattr__(self, "changes", changes)
@@ -92,9 +89,18 @@ class Scenario:
             if after.time < before.time + before.duration:
                 raise InputError("changes", after.time, "after the end of the change before")
 
-    def perturbation(self) -> FloatArray:
-        """Return what is added to the state at t = 0, shape (4,)."""
-        return np.array([float(self.initial.get(name, 0.0)) for name in STATE_NAMES])
+    def perturbation(self, names: tuple[str, ...]) -> FloatArray:
+        """Return what is added to the states of these names at t = 0, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If another state is perturbed.
+        """
+        for name in self.initial:
+            if name not in names:
+                raise InputError("initial", name, f"one of {', '.join(names)}")
+        return np.array([float(self.initial.get(name, 0.0)) for name in names])
 
     def drive(self, point: OperatingPoint) -> FloatArray:
         """Return the motion of the top end and the rock strength, piece by piece.

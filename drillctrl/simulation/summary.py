@@ -74,12 +74,13 @@ def summarise(simulation: Trace) -> Summary:
     """Return the figures of a run."""
     end = float(simulation.times[-1])
     since = 0.75 * end
+    inputs = simulation.input_names
     if simulation.steps == 0:
         tail = run = simulation.at([0.0])
     else:
-        run = simulation.on_steps(PER_STEP)
+        run = simulation.on_steps(PER_STEP, names=("x", "theta", *inputs))
         # The run is in order of time; its tail starts with the step that holds `since`.
-        tail = simulation.on_steps(PER_STEP, since)
+        tail = simulation.on_steps(PER_STEP, since, ("x", "theta", "dtheta", "delay", "contact"))
     settled = all(
         float(abs(getattr(tail, name)).max()) <= SETTLED * float(abs(getattr(run, name)).max())
         for name in ("x", "theta")
@@ -94,7 +95,7 @@ def summarise(simulation: Trace) -> Summary:
         axial_min=_extreme(simulation, tail, "x", least=True),
         axial_max=_extreme(simulation, tail, "x"),
         delay_max=_extreme(simulation, tail, "delay"),
-        max_abs_u=float(max(abs(run.axial).max(), abs(run.torque).max())),
+        max_abs_u=max((float(abs(getattr(run, name)).max()) for name in inputs), default=0.0),
         lost_contact=not bool(tail.contact.all()),
         axial_stick_fraction=_share(simulation, "held", since, end),
         events=len(simulation.events),
@@ -121,7 +122,7 @@ def settling_time(simulation: Trace, within: float = SETTLED_WITHIN) -> float | 
     """
     if simulation.status != "done" or simulation.steps == 0:
         return None
-    motion = simulation.on_steps(PER_STEP)
+    motion = simulation.on_steps(PER_STEP, names=("x", "theta"))
     last = 0.0
     for values in (abs(motion.x), abs(motion.theta)):
         beyond = np.flatnonzero(values > within * values.max(initial=0.0))
@@ -146,14 +147,14 @@ def _extreme(simulation: Trace, tail: Motion, name: str, *, least: bool = False)
     low, high = tail.times[max(k - 1, 0)], tail.times[min(k + 1, values.size - 1)]
     best = float(values[k])
     if high > low:
-        finer = simulation.at(np.linspace(low, high, 65))
+        finer = simulation.at(np.linspace(low, high, 65), (name,))
         best = max(best, float((sign * getattr(finer, name)).max()))
     return sign * best
 
 
 def section_crossings(simulation: Trace, since: float) -> FloatArray:
     """Return the times at which θ rises through the middle of its range, by bisection."""
-    tail = simulation.on_steps(PER_STEP, since)
+    tail = simulation.on_steps(PER_STEP, since, ("theta",))
     middle = 0.5 * (tail.theta.max() + tail.theta.min())
     beyond = tail.theta - middle
     rising = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
@@ -162,9 +163,9 @@ def section_crossings(simulation: Trace, since: float) -> FloatArray:
         centre = 0.5 * (low + high)
         if centre.size == 0:
             break
-        before = simulation.at(centre).theta < middle
+        before = simulation.at(centre, ("theta",)).theta < middle
         low, high = np.where(before, centre, low), np.where(before, high, centre)
-    return 0.5 * (low + high)
+    return np.asarray(0.5 * (low + high))
 
 
 def period(simulation: Trace, since: float) -> float | None:
@@ -177,13 +178,15 @@ def period(simulation: Trace, since: float) -> float | None:
     times = section_crossings(simulation, since)
     if times.size < 3:
         return None
-    tail = simulation.on_steps(PER_STEP, since)
-    motion = simulation.at(times)
-    names = ("x", "dx", "theta", "dtheta")
-    states = np.stack([getattr(motion, name) for name in names])
+    names = simulation.state_names
+    tail = simulation.on_steps(PER_STEP, since, names)
+    motion = simulation.at(times, names)
     size = np.array([np.ptp(getattr(tail, name)) for name in names])[:, None]
-    if not (size > 0.0).all():
+    moving = size[:, 0] > 0.0
+    if not moving[:4].all():
         return None
+    states = np.stack([getattr(motion, name) for name in names])[moving]
+    size = size[moving]
     for count in range(1, min(times.size - 1, MAX_RETURNS)):
         apart = abs(states[:, count:] - states[:, :-count]) / size
         if apart.max() < RETURNED:

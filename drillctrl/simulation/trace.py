@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -12,26 +12,13 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.kernel import data
+from drillctrl.simulation.structure import Structure
 
 Places = npt.NDArray[np.int64]
-MOTION_COLUMNS = (
-    "x",
-    "dx",
-    "theta",
-    "dtheta",
-    "ddx",
-    "ddtheta",
-    "delay",
-    "depth",
-    "pressed",
-    "weight_on_bit",
-    "torque_on_bit",
-    "axial",
-    "torque",
-    "contact",
-)
 
 
 class Event(NamedTuple):
@@ -54,16 +41,17 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The motion at some instants; every array has the shape of ``times``.
+    """The motion at some instants; every column is an array, and an attribute, of one length.
 
     Attributes
     ----------
     times : array
         Dimensionless time.
     x, dx, theta, dtheta : array
-        Perturbations of steady drilling at the starting point.
+        Of the bit, as perturbations of steady drilling at the starting point; further states
+        of the plant by their names.
     ddx, ddtheta : array
-        Accelerations.
+        Accelerations of the bit.
     delay : array
         τ, the time since the blade ahead passed.
     depth : array
@@ -73,32 +61,21 @@ class Motion:
     weight_on_bit, torque_on_bit : array
         What the rock bears; see `Simulation.steady_load` for the steady part.
     axial, torque : array
-        Inputs from the controller, after its actuator.
+        Inputs from the controller, after its actuator; those of the plant by their names.
     contact, stuck, held : bool array
         Bit in the rock; in torsional stick; held at Z' = 0 by the wear flat.
     """
 
-    times: FloatArray
-    x: FloatArray
-    dx: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    ddx: FloatArray
-    ddtheta: FloatArray
-    delay: FloatArray
-    depth: FloatArray
-    pressed: FloatArray
-    weight_on_bit: FloatArray
-    torque_on_bit: FloatArray
-    axial: FloatArray
-    torque: FloatArray
-    contact: npt.NDArray[np.bool_]
-    stuck: npt.NDArray[np.bool_]
-    held: npt.NDArray[np.bool_]
+    _values: Mapping[str, npt.NDArray[Any]]
+
+    def __getattr__(self, name: str) -> npt.NDArray[Any]:
+        if name.startswith("_") or name not in self._values:
+            raise AttributeError(name)
+        return self._values[name]
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return the arrays by name, times first: the columns of a table."""
-        return dict(vars(self))
+        return dict(self._values)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,8 +84,8 @@ class Trace:
 
     Attributes
     ----------
-    point : OperatingPoint
-        The starting point; the motion is a perturbation of its steady drilling.
+    case : Case
+        What drills, and where; the motion is a perturbation of its steady drilling.
     model, cutting : str
         As given to `simulate`.
     duration : float
@@ -118,46 +95,59 @@ class Trace:
         ``"step limit"``, ``"face too old"``, ``"not finite"``.
     elapsed_seconds : float
         Wall time of the integration.
-    settings : mapping
-        What the kernel was told, by name.
-    history : mapping
-        Columns of the steps as the kernel keeps them, by kind (``"real"``, ``"whole"``).
+    structure : Structure
+        The string and the law of its bit.
+    settings : Settings
+        What the kernel was told.
+    history : History
+        The steps as the kernel keeps them.
     first : int
         Place of the first step after t = 0 in it.
     """
 
-    point: OperatingPoint
+    case: Case
     model: str
     cutting: str
     duration: float
     status: str
     elapsed_seconds: float
-    settings: Mapping[str, Any] = field(repr=False)
-    history: Mapping[str, Any] = field(repr=False)
+    structure: Structure = field(repr=False)
+    settings: data.Settings = field(repr=False)
+    history: data.History = field(repr=False)
     first: int = field(default=1, repr=False)
 
-    @functools.cached_property
-    def _compiled(self) -> tuple[Any, Any]:
-        # Plain mappings are kept, so that a run pickles without its generated classes.
-        data = kernel("data")
-        return data.Settings(**self.settings), data.History(**self.history)
+    @property
+    def point(self) -> OperatingPoint:
+        """The starting point."""
+        return self.case.physics("a motion")[1]
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in vars(self).items() if k != "_compiled"}
+    @functools.cached_property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of all columns that `at` and `on_steps` can return."""
+        string = self.structure
+        return data.sample_columns(string.state_names, string.input_names, string.output_names)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states, those of the bit first."""
+        return self.structure.state_names
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.structure.input_names
 
     def _column(self, name: str) -> npt.NDArray[Any]:
         """A column of the steps from t = 0 on and the one before, by its name in the kernel."""
-        data = kernel("data")
         real = name in ("START", "LENGTH")
-        column: npt.NDArray[Any] = self.history["real" if real else "whole"][
-            self.first - 1 :, getattr(data, name)
-        ]
+        table = self.history.real if real else self.history.whole
+        column: npt.NDArray[Any] = table[self.first - 1 :, getattr(data, name)]
         return column
 
     @property
     def steps(self) -> int:
         """Number of accepted steps."""
-        return int(self.history["real"].shape[0]) - self.first
+        return int(self.history.real.shape[0]) - self.first
 
     @functools.cached_property
     def times(self) -> FloatArray:
@@ -171,32 +161,39 @@ class Trace:
         """The motion at `times`."""
         return self.at(self.times)
 
-    def at(self, times: npt.ArrayLike) -> Motion:
+    def at(self, times: npt.ArrayLike, names: Sequence[str] | None = None) -> Motion:
         """Return the motion at any instants of the run, by the dense output of the steps.
 
         Parameters
         ----------
         times : array_like
             Within [0, ``times[-1]``]. Where a quantity jumps, its value after the jump.
+        names : sequence of str, optional
+            Columns, by default those of `Motion`; also the rate of any state (``d`` and its
+            name) and any output.
 
         Raises
         ------
         InputError
-            If an instant is outside the run.
+            If an instant is outside the run, or a name unknown.
         """
         when = np.atleast_1d(np.asarray(times, dtype=float))
         if when.size and not (when.min() >= 0.0 and when.max() <= self.times[-1]):
             raise InputError("times", f"{when.min():g} to {when.max():g}", self._span())
         places = np.searchsorted(self._column("START"), when, side="right") - 1
-        return self._evaluate(np.clip(places, 0 if self.steps == 0 else 1, self.steps), when)
+        places = np.clip(places, 0 if self.steps == 0 else 1, self.steps)
+        return self._evaluate(places, when, names)
 
     def _span(self) -> str:
         return f"within [0, {self.times[-1]:g}]"
 
-    def on_steps(self, per_step: int, since: float = 0.0) -> Motion:
+    def on_steps(
+        self, per_step: int, since: float = 0.0, names: Sequence[str] | None = None
+    ) -> Motion:
         """Return the motion at equally spaced places of every step, ends included.
 
         At a jump both sides are there: the end of one step and the start of the next.
+        ``names`` are as in `at`.
         """
         start, length = self._column("START"), self._column("LENGTH")
         first = max(1, int(np.searchsorted(start, since, side="right")) - 1)
@@ -204,34 +201,40 @@ class Trace:
         grid = start[first:, None] + length[first:, None] * s
         index = np.broadcast_to(np.arange(first, start.size)[:, None], grid.shape)
         keep = grid.ravel() >= since
-        return self._evaluate(index.ravel()[keep], grid.ravel()[keep])
+        return self._evaluate(index.ravel()[keep], grid.ravel()[keep], names)
 
-    def _evaluate(self, places: Places, times: FloatArray) -> Motion:
-        data = kernel("data")
-        settings, history = self._compiled
+    def _evaluate(self, places: Places, times: FloatArray, names: Sequence[str] | None) -> Motion:
+        every = self.column_names
+        plant = self.state_names, self.input_names, self.structure.output_names
+        asked = data.motion_columns(*plant) if names is None else tuple(names)
+        for name in asked:
+            if name not in every:
+                raise InputError("names", name, f"of {', '.join(every)}")
+        wanted = np.array([every.index(name) for name in asked], dtype=np.int64)
         places = np.ascontiguousarray(places, dtype=np.int64)
-        taken, before = history.real.shape[0], self.first - 1
-        rows = kernel("sample").evaluate(settings, history, taken, places + before, times)
-        stuck = self._column("TORSION")[places] == data.STUCK
-        held = self._column("AXIAL")[places] == data.HELD
+        taken, before = self.history.real.shape[0], self.first - 1
+        rows = kernel("sample", self.structure.physics).evaluate(
+            self.settings, self.history, taken, places + before, times, wanted
+        )
+        values: dict[str, npt.NDArray[Any]] = {
+            "times": times, **dict(zip(asked, rows, strict=True))
+        }  # fmt: skip
         nonlinear = self.model == "nonlinear"
-        values = dict(zip(MOTION_COLUMNS, np.ascontiguousarray(rows.T), strict=True))
-        on_rock = values.pop("contact") > 0.0
-        modes = {"contact": on_rock, "stuck": stuck & nonlinear, "held": held & nonlinear}
-        return Motion(times=times, **values, **modes)
+        if "contact" in values:
+            values["contact"] = values["contact"] > 0.0
+        values["stuck"] = nonlinear & (self._column("TORSION")[places] == data.STUCK)
+        values["held"] = nonlinear & (self._column("AXIAL")[places] == data.HELD)
+        return Motion(values)
 
     @functools.cached_property
     def steady_load(self) -> tuple[float, float]:
         """Weight and torque on bit of steady drilling at the starting point."""
-        load = kernel("physics").load
-        cut = 2.0 * np.pi * self.point.delta0
-        weight, torque = load((cut, 1.0, 1.0), self.settings["p"])
+        weight, torque = self.settings.real[[data.WEIGHT, data.TORQUE]]
         return float(weight), float(torque)
 
     @functools.cached_property
     def events(self) -> tuple[Event, ...]:
         """Changes of mode in order of time."""
-        data = kernel("data")
         torsion = {data.STUCK: "stick", data.FORWARD: "release", data.REVERSE: "reverse"}
         axial = {data.HELD: "hold", data.DOWN: "advance", data.UP: "lift"}
         contact = {0: "loss", 1: "return"}
@@ -267,8 +270,8 @@ class Trace:
             Torsional stick, axial hold, loss of contact, an input or actuator at its limit.
         """
         modes = {
-            "stuck": self._column("TORSION") == kernel("data").STUCK,
-            "held": self._column("AXIAL") == kernel("data").HELD,
+            "stuck": self._column("TORSION") == data.STUCK,
+            "held": self._column("AXIAL") == data.HELD,
             "lost": self._column("CONTACT") == 0,
             "saturated": self._column("SATURATED") != 0,
         }

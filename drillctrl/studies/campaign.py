@@ -19,7 +19,7 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import write_text
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.drilling.branches import STATE_NAMES
+from drillctrl.drilling.case import as_case
 from drillctrl.simulation.controller import Controller
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.grid import Grid
@@ -243,9 +243,6 @@ def campaign(
     """
     steps = _checked_sizes(sizes)
     kick = {name: checked_number(f"disturbance {name}", v) for name, v in disturbance.items()}
-    for name in kick:
-        if name not in STATE_NAMES:
-            raise InputError("disturbance", name, f"of {', '.join(STATE_NAMES)}")
     if not any(kick.values()):
         raise InputError("disturbance", dict(disturbance), "other than zero")
     checked_number("largest", largest, steps[-1], 1e6)
@@ -254,6 +251,10 @@ def campaign(
     if duration is not None:
         checked_number("duration", duration, 1.0, 1e6)
     for point in grid.points:
+        states = as_case(point).physics("a campaign")[0].state_names
+        for name in kick:
+            if name not in states:
+                raise InputError("disturbance", name, f"of {', '.join(states)}")
         if kick.get("dtheta", 0.0) * largest < -point.omega0:
             raise InputError("largest", largest, f"such that θ' ≥ −ω0 = {-point.omega0:g}")
     trials = [

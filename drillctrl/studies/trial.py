@@ -68,7 +68,10 @@ class Trial:
         """Hash of all that the result depends on."""
         parts: list[Any] = [getattr(self, f.name) for f in fields(self) if f.name != "controller"]
         if self.controller is not None:
-            parts += [array.tolist() for array in self.controller.gains()]
+            feedback = self.controller.feedback
+            assert isinstance(feedback, FeedbackStructure)
+            parts += [feedback.inputs, feedback.outputs]
+            parts += [array.tolist() for array in self.controller.gain_sets()]
             parts.append(self.controller.delays(0.0).tolist())
             own = ("feedback", "K1", "K2", "schedule")
             parts += [

@@ -8,18 +8,19 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from drillctrl.drilling.branches import (
-    branch_functions,
-    dimensionless_plant,
-    parameter_vector,
-    rhs_function,
-)
+from drillctrl.drilling.case import as_case
+from drillctrl.drilling.linear import rhs_function
+from drillctrl.drilling.motion import law_functions
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.kernel import data
+from drillctrl.simulation.layout import settings_for
+from drillctrl.simulation.structure import structure_of
 from drillctrl.simulation.translate import translate
 
 RNG = np.random.default_rng(7)
 POINT = OperatingPoint(10.0, 2.5, 14.0)
+CASE = as_case(POINT)
 
 
 def as_python(function: ca.Function):
@@ -31,19 +32,17 @@ def as_python(function: ca.Function):
 
 def arguments(function: ca.Function) -> list:
     sizes = [function.nnz_in(i) for i in range(function.n_in())]
-    values = [RNG.normal(size=size) * 3.0 for size in sizes]
-    values[-1] = parameter_vector(POINT) * RNG.uniform(0.5, 2.0, 9)
-    return values
+    return [RNG.normal(size=size) * 3.0 for size in sizes]
 
 
 def plain(values: list) -> list:
     return [float(v[0]) if v.size == 1 else tuple(v.tolist()) for v in values]
 
 
-@pytest.mark.parametrize("index", range(6))
+@pytest.mark.parametrize("index", range(4))
 def test_compiled_physics_equals_casadi(index):
-    function = branch_functions()[index]
-    compiled = getattr(kernel("physics"), function.name())
+    function = law_functions(CASE.plant.bit)[index]
+    compiled = getattr(kernel("physics", structure_of(CASE).physics), function.name())
     for _ in range(50):
         values = arguments(function)
         expected = function(*values).full().ravel()
@@ -52,11 +51,12 @@ def test_compiled_physics_equals_casadi(index):
 
 
 def test_translation_of_switches_equals_casadi():
-    function = rhs_function(dimensionless_plant())
+    function = rhs_function(CASE.plant)
     translated = as_python(function)
     seen = set()
-    for _ in range(300):
+    for _ in range(1000):
         values = arguments(function)
+        values[-1] = CASE.parameter_vector * RNG.uniform(0.5, 2.0, 9)
         # Both sides of every switch, and the switches themselves.
         values[0][1] = RNG.choice([-1.0, 0.0, 1.0]) * 25.0 - values[-1][0] * values[-1][1]
         values[0][3] = RNG.choice([-2.0, 0.0, 2.0]) - values[-1][0]
@@ -94,8 +94,9 @@ def test_unknown_operation_is_refused():
 @pytest.mark.parametrize("axial", ["DOWN", "UP"])
 @pytest.mark.parametrize("contact", [0, 1])
 def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
-    data, model = kernel("data"), kernel("model")
-    p = parameter_vector(POINT)
+    string = structure_of(CASE)
+    model = kernel("model", string.physics)
+    p = CASE.parameter_vector
     tau = 0.2
     z_rate = 3.0 if axial == "DOWN" else -3.0
     turn = 4.0 if torsion == "FORWARD" else -4.0
@@ -103,16 +104,16 @@ def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     depth = 9.0 if contact else -9.0
     then = np.zeros(4)
     then[0] = state[0] + 25.0 * tau - depth / 4.0
-    expected = rhs_function(dimensionless_plant())(state, then, tau, [0.1, 0.2], p).full().ravel()
-    result = model.branch_acceleration(
-        tuple(state),
-        (0.1, 0.2),
-        (0.0, 0.0),
-        depth,
-        contact,
-        getattr(data, torsion),
-        getattr(data, axial),
-        tuple(p),
-        np.zeros(data.PROBES),
-    )
-    np.testing.assert_allclose(result, expected[[1, 3]], rtol=1e-12)
+    expected = rhs_function(CASE.plant)(state, then, tau, [0.1, 0.2], p).full().ravel()
+    settings = settings_for(
+        string, None, np.zeros((1, 9)), duration=1.0, linear=False, multiple=True, rtol=1e-8,
+        atol=1e-10,
+    )  # fmt: skip
+    arrays = string.arrays
+    alone = arrays.A @ state + arrays.B @ [0.1, 0.2]
+    load = model.bit_load(
+        alone[1], alone[3], depth, (z_rate, turn), contact, getattr(data, torsion),
+        getattr(data, axial), settings.real, settings.q, np.zeros(data.P_ROOM),
+    )  # fmt: skip
+    found = alone + arrays.E @ (np.array(load) - arrays.steady)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

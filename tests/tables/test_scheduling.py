@@ -44,7 +44,7 @@ def test_course_of_a_scenario():
 
 def test_gains_follow_the_rock_and_the_motion_settles(rocks):
     controller = scheduled(rocks, START, HARDER, interval=1.0)
-    times, K1, K2 = controller.gains()
+    times, K1, K2 = controller.gain_sets()
     assert times.tolist() == [0.0, *np.linspace(31.0, 36.0, 6)]
     before, after = (rocks.gains_at(10.0, 1.5, psi) for psi in (12.0, 24.0))
     assert K1[0].sum() == pytest.approx(before[0].item())
@@ -63,7 +63,7 @@ def test_gains_follow_the_rock_and_the_motion_settles(rocks):
 
 def test_a_controller_that_learns_late_switches_late(rocks):
     late = scheduled(rocks, START, Scenario(changes=(Change(5.0, psi=24.0),)), late=2.0)
-    assert late.gains()[0].tolist() == [0.0, 7.0]
+    assert late.gain_sets()[0].tolist() == [0.0, 7.0]
 
 
 @pytest.fixture(scope="module")

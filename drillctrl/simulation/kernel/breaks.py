@@ -10,7 +10,14 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .data import CONTACT, LAST_LEVEL, LEVEL, MAX_FACE_LEVELS, MULTIPLE, STUCK
+from .data import (
+    CONTACT,
+    LAST_LEVEL,
+    LEVEL,
+    MAX_FACE_LEVELS,
+    MULTIPLE,
+    STUCK,
+)
 from .interpolate import beyond, locate_angle, pitch_of, step_before_angle
 from .physics import rates
 
@@ -26,9 +33,9 @@ def advance(history, steps, following, k, at):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def angle_left(history, p, b, k, t, theta):
+def angle_left(history, q, b, k, t, theta):
     """Angle the bit has yet to turn until the lag of k + 1 pitches reaches break b."""
-    return -beyond(history, p, b, 0.0, t, theta, k * pitch_of(p))
+    return -beyond(history, q, b, 0.0, t, theta, k * pitch_of(q))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -44,22 +51,22 @@ def time_to_turn(angle, rate, acceleration):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def angle_limits(history, p, steps, mode, chain, following, t, y, acceleration):
+def angle_limits(history, q, steps, mode, chain, following, t, y, acceleration):
     """Return the time to the nearest break seen through the angle, and to the last step."""
     if mode.torsion == STUCK:
         return np.inf, np.inf
-    rate = rates((0.0, 0.0, 0.0, y[3]), p)[1]
+    rate = rates((0.0, 0.0, 0.0, y[3]), q)[1]
     nearest = np.inf
     for k in range(mode.passes):
         b = advance(history, steps, following, k, chain[k])
         if b < steps:
-            left = angle_left(history, p, b, k, t, y[2])
+            left = angle_left(history, q, b, k, t, y[2])
             nearest = min(nearest, time_to_turn(left, rate, acceleration))
-    return nearest, time_to_turn(0.9 * pitch_of(p), rate, acceleration)
+    return nearest, time_to_turn(0.9 * pitch_of(q), rate, acceleration)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def least_angle_left(history, p, steps, mode, following, t, theta):
+def least_angle_left(history, q, steps, mode, following, t, theta):
     """Least angle left over all lags, and which lag it is (-1: no break ahead)."""
     least, which = np.inf, -1
     if mode.torsion == STUCK:
@@ -67,7 +74,7 @@ def least_angle_left(history, p, steps, mode, following, t, theta):
     for k in range(mode.passes):
         b = following[k]
         if b < steps:
-            left = angle_left(history, p, b, k, t, theta)
+            left = angle_left(history, q, b, k, t, theta)
             if left < least:
                 least, which = left, k
     return least, which
@@ -76,9 +83,9 @@ def least_angle_left(history, p, steps, mode, following, t, theta):
 @numba.njit(cache=True, error_model="numpy")
 def follow(settings, history, steps, mode, chain, t, theta):
     """Move the places of the lagged instants along, within their smooth pieces."""
-    pitch = pitch_of(settings.p)
+    pitch = pitch_of(settings.q)
     for k in range(mode.passes):
-        j, _ = locate_angle(history, settings.p, steps, chain[k], t, theta, k * pitch)
+        j, _ = locate_angle(history, settings.q, steps, chain[k], t, theta, k * pitch)
         if j >= 0:
             chain[k] = j
 
@@ -90,14 +97,14 @@ def retrace(settings, history, steps, chain, following, t, theta, tolerance):
     With one lag the face is what the blade ahead left, wherever it was. With all passes
     counted, a blade that was off the rock left the face of the pass before.
     """
-    pitch = pitch_of(settings.p)
+    pitch = pitch_of(settings.q)
     start = chain[0]
     for k in range(MAX_FACE_LEVELS):
         b = following[k] if k == 0 else start
         b = min(max(b, start), steps - 1) if k == 0 else start
-        j = step_before_angle(history, settings.p, b, t, theta, k * pitch, tolerance)
+        j = step_before_angle(history, settings.q, b, t, theta, k * pitch, tolerance)
         chain[k], following[k], start = j, j + 1, j
-        if settings.flags[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
+        if settings.whole[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
             return k + 1
     return MAX_FACE_LEVELS + 1
 

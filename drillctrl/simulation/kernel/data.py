@@ -1,11 +1,14 @@
 """What the compiled integrator works on: settings, and the steps it has taken.
 
 Numba takes named tuples of arrays; arrays are shared, so what one function writes the others
-see. Times, lengths and torques are dimensionless throughout.
+see. Times, lengths and torques are dimensionless throughout. Nothing here depends on how many
+states n, inputs m and outputs p a plant has: sizes are data, so another string or drive runs
+in the same machine code.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 # Torsion of the bit: Φ' > 0, held at Φ' = 0, Φ' < 0.
@@ -13,12 +16,12 @@ FORWARD, STUCK, REVERSE = 0, 1, 2
 # Axial motion while in contact: Z' > 0, held at Z' = 0 by the wear flat, Z' < 0.
 DOWN, HELD, UP = 0, 1, 2
 
-# Events. All but the last two are zeros of functions that are positive in the present mode.
+# Events that are zeros of functions which are positive in the present mode.
 TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2
 AXIAL_RATE, HELD_TO_UP, HELD_TO_DOWN, DEPTH = 3, 4, 5, 6
-# An input at its limit, or its actuator at its fastest: one kind for each input.
-AT_LIMIT, AT_RATE_LIMIT, KINDS = 7, 9, 11
-BARRIER, BEGIN = 11, 12
+BARRIER, BEGIN = 7, 8
+# Input i at its limit: AT_LIMIT + i; its actuator at its fastest: AT_LIMIT + m + i.
+AT_LIMIT = 9
 
 # How the march stopped.
 DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE = 0, 1, 2, 3, 4, 5
@@ -29,70 +32,120 @@ LAST_LEVEL = 4
 NO_BREAK = 99
 MAX_FACE_LEVELS = 400
 
-# Entries of `flags`.
-LINEAR, MULTIPLE, FEEDBACK, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK = 0, 1, 2, 3, 4, 5, 6
-# Entries of `control`.
-T_ON, MEASURE_DELAY, PERIOD, LAG_TIME = 0, 1, 2, 3
-# Column of `gains`, behind K1 and K2.
-PAST_AGE = 17
+# Entries of ``Settings.whole``: sizes of the plant, switches, and from ROWS on the matrix.
+STATES, INPUTS, OUTPUTS = 0, 1, 2
+# PAST: there are gains on delayed outputs; FED: place of the list of outputs that are fed back.
+(LINEAR, MULTIPLE, FEEDBACK, PAST, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK, FED,
+ ROWS) = range(3, 13)  # fmt: skip
+# Entries of ``Settings.real``. Weight and torque on bit and depth of cut in steady drilling;
+# what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1].
+WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
+# The controller's clock; errors allowed; constant delays of the linear model and of the
+# measured signal, 0 where there is none; size of each event function, to tell zero from
+# rounding, and that of the last ones: the limits of inputs (m) and of their rates (m).
+T_ON, MEASURE_DELAY, PERIOD, LAG_TIME, RTOL, ATOL, LAGS = 5, 6, 7, 8, 9, 10, 11
+SCALE = 13
+LIMITS = SCALE + AT_LIMIT
+# Columns of `schedule`.
+SINCE, PAST_AGE = 0, 1
 # Columns of `drive`: start; top-end offset, speed, acceleration for x and θ; strength and slope.
 DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
-# Entries of `probe`, beside an event function's ingredients.
-# P_ROOM: what is left until each limit of AT_LIMIT, AT_RATE_LIMIT is met; negative beyond.
-P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_U0, P_U1 = range(9)
-P_ROOM, PROBES = 9, 13
+# Entries of `probe`, beside an event function's ingredients; behind them, from P_ROOM on, what
+# is left until each limit is met (2 m, negative beyond), and the inputs (m).
+(P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_WEIGHT, P_TORQUE,
+ P_ROOM) = range(10)  # fmt: skip
 
+# Rows of `Work`.
+STAGES = 7
+END, INCREMENT, BETWEEN = 0, 1, 2
 
 # Columns of `History`.
-START, LENGTH, X, THETA, ACTUATORS, HELD_U, REALS = 0, 1, 2, 8, 14, 22, 24
+START, LENGTH, X, THETA, OTHERS = 0, 1, 2, 8, 14
+QUINTIC, QUARTIC = 6, 5
 CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, SATURATED, WHOLES = range(9)
+
+# What is known of the bit at an instant; the columns of a sample start with these.
+BIT_COLUMNS = ("delay", "depth", "pressed", "weight_on_bit", "torque_on_bit", "contact")
+C_DELAY, C_DEPTH, C_PRESSED, C_WEIGHT, C_TORQUE, C_CONTACT, C_STATES = range(7)
+
+
+def sample_columns(
+    states: Sequence[str], inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the names of all columns of a sample, in the order of `sample.evaluate`.
+
+    They are `BIT_COLUMNS`, the states, their rates of change (``d`` and the state's name; a
+    rate that is a state is found among these), the inputs, and the outputs (``y_`` and their
+    name where that is taken).
+    """
+    names = [*BIT_COLUMNS, *states, *(f"d{name}" for name in states), *inputs]
+    taken = set(names)
+    return (*names, *(f"y_{name}" if name in taken else name for name in outputs))
+
+
+def motion_columns(
+    states: Sequence[str], inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the names of the columns that a motion has unless others are asked for."""
+    taken = {*sample_columns(states, inputs, ())}
+    new = [name for name in outputs if name not in taken]
+    *bit, contact = BIT_COLUMNS
+    return (*states, "ddx", "ddtheta", *bit, *inputs, *new, contact)
+
+
+def history_width(states: int, inputs: int) -> int:
+    """Return the number of columns of ``History.real``."""
+    return OTHERS + QUARTIC * (states + inputs - 4) + inputs
+
+
+def vector_length(states: int, inputs: int) -> int:
+    """Return the length of the vector that the march moves; see `Settings`."""
+    return states + 3 * inputs + 6
 
 
 class Settings(NamedTuple):
-    """What does not change during a run; tuples where arrays would cost a reference count.
+    """What does not change during a run, in few arrays: each adds to the compiler's work.
+
+    The motion is X' = A X + B u + T top + E (load − steady), of which X starts with x, x',
+    θ, θ' of the bit, and the outputs are C X − R top. All of it acts on one vector,
+
+        y = (X, actuators, held outputs of a sampled controller, u, top, load − steady),
+
+    of length n + m + m + m + 4 + 2, so that A, B, T, E, C and R are the rows of one sparse
+    matrix. In the linear model the bit's state a delay ago takes the place of top.
 
     Attributes
     ----------
-    p : tuple, (9,)
-        Groups in the order of `PARAMETER_NAMES`.
-    flags : tuple of int
-        LINEAR, MULTIPLE, FEEDBACK, ...
-    control : tuple
-        T_ON, MEASURE_DELAY, ...
-    limit, rate : tuple, (2,)
-        Of each input, infinite where there is none.
-    gains : array, (g, 18)
-        From when each set of gains holds; K1, then K2, by rows, on all states; PAST_AGE:
-        how old the delayed outputs are, sampled: beyond the measurement's age, continuous:
-        in all, 0 where there are none or they are those of τ(t) ago.
-    drive : array, (m, 9)
+    q : tuple
+        Coefficients and the law's own parameters: last argument of the generated functions.
+    whole : int array
+        STATES, ...; LINEAR, ...; ROWS; the list of FED.
+    real : array
+        WEIGHT, ...; T_ON, ...; SCALE; LIMITS, infinite where there is none.
+    value : array
+        Entries of the matrix. Those of row i are at whole[ROWS + i] to whole[ROWS + i + 1]
+        here, and their columns there in ``whole``. Rows are the n of X', the p outputs, and
+        what the linear depth of cut is beyond its steady value.
+    schedule : array, (g, 2)
+        SINCE when each set of gains holds; PAST_AGE: how old the delayed outputs are,
+        sampled: beyond the measurement's age, continuous: in all, 0 where there are none or
+        they are those of τ(t) ago.
+    gains : array, (2, g, m, f)
+        K1 on the f outputs that are fed back, and K2 on them delayed.
+    drive : array, (k, 9)
         Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
-    linear : array, (5, 10)
-        A1, A2, B of the linear model side by side; below them the rows of the linear depth
-        of cut, and its steady value.
-    lags : tuple, (2,)
-        Constant delays: of the linear model and of the measured signal; 0 where there is
-        none. See also `lag_of`.
-    noise : array, (k, 4)
-        Added to the k-th sample of the states.
-    tolerance : tuple, (2,)
-        rtol, atol.
-    scale : tuple, (11,)
-        Size of each event function, to tell zero from rounding.
+    noise : array, (k, f)
+        Added to the k-th sample of these outputs.
     """
 
-    p: Any
-    flags: Any
-    control: Any
-    limit: Any
-    rate: Any
+    q: Any
+    whole: Any
+    real: Any
+    value: Any
+    schedule: Any
     gains: Any
     drive: Any
-    linear: Any
-    lags: Any
     noise: Any
-    tolerance: Any
-    scale: Any
 
 
 class History(NamedTuple):
@@ -100,11 +153,11 @@ class History(NamedTuple):
 
     Attributes
     ----------
-    real : array, (cap, 24)
+    real : array, (cap, `history_width`)
         START: time at which a step starts; LENGTH; X, THETA: coefficients of quintics in
-        s = (t − start)/length; ACTUATORS: those of a cubic for each actuator; HELD_U: output
-        of a sampled controller.
-    whole : int array, (cap, 9)
+        s = (t − start)/length; OTHERS: those of a quartic for each further state and then
+        each actuator; held output of a sampled controller.
+    whole : int array, (cap, WHOLES)
         CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
         t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade
         pitches it lies back; SATURATED: see `Mode`.
@@ -117,7 +170,7 @@ class History(NamedTuple):
 class Mode(NamedTuple):
     """One smooth branch of the model, and where its delayed signals are found.
 
-    Bit i of ``saturated`` says that an event of kind AT_LIMIT + i has set in.
+    Bit i of ``saturated`` says that event AT_LIMIT + i has set in.
     """
 
     contact: int
@@ -133,5 +186,21 @@ class Mode(NamedTuple):
     piece: int
     gains: int
     on: int
-    held0: float
-    held1: float
+
+
+class Work(NamedTuple):
+    """Arrays that a step is tried in.
+
+    Attributes
+    ----------
+    rates : array, (8, n + m)
+        Rates of change at the stages; behind them those of an evaluation in between.
+    stages : array, (8, probes + 2)
+        Probe of each stage, with x' and θ' behind it; then that of an evaluation in between.
+    vectors : array, (3, `vector_length`)
+        END of the step, INCREMENT from its start; a vector BETWEEN.
+    """
+
+    rates: Any
+    stages: Any
+    vectors: Any

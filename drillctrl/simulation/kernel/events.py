@@ -7,34 +7,38 @@ import numpy as np
 
 from .data import (
     ACTUATOR,
-    ACTUATORS,
     AT_LIMIT,
-    AT_RATE_LIMIT,
     AXIAL_RATE,
+    BARRIER,
+    BETWEEN,
     DEPTH,
     DOWN,
     FORWARD,
     HELD,
     HELD_TO_DOWN,
     HELD_TO_UP,
+    INPUTS,
     LENGTH,
+    LIMITS,
     P_DEPTH,
     P_DOWN,
     P_FORWARD,
     P_REVERSE,
     P_ROOM,
     P_UP,
-    PROBES,
     RELEASE_FORWARD,
     RELEASE_REVERSE,
     SAMPLED,
+    SCALE,
+    STAGES,
     START,
     STUCK,
     TORSION_RATE,
 )
-from .interpolate import cubic, state_at
+from .interpolate import state_at
 from .model import rate_of_change
 from .physics import rates
+from .step import recall
 
 SAMPLES = 10
 NONE = 2.0
@@ -43,13 +47,13 @@ NONE = 2.0
 @numba.njit(cache=True, error_model="numpy")
 def watched(settings, kind, mode):
     """Whether an event can end the present mode."""
-    flags = settings.flags
     if kind >= AT_LIMIT:
-        if mode.on == 0:
+        limit, of_rate = kind - AT_LIMIT, kind >= AT_LIMIT + settings.whole[INPUTS]
+        if mode.on == 0 or not np.isfinite(settings.real[LIMITS + limit]):
             return False
-        if kind >= AT_RATE_LIMIT:
-            return flags[ACTUATOR] == 1 and np.isfinite(settings.rate[kind - AT_RATE_LIMIT])
-        return flags[SAMPLED] == 0 and np.isfinite(settings.limit[kind - AT_LIMIT])
+        return settings.whole[ACTUATOR] == 1 if of_rate else settings.whole[SAMPLED] == 0
+    if kind >= BARRIER:
+        return False
     if kind == TORSION_RATE:
         return mode.torsion != STUCK
     if kind in (RELEASE_FORWARD, RELEASE_REVERSE):
@@ -62,7 +66,7 @@ def watched(settings, kind, mode):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def value_of(kind, mode, probe, dx, dtheta, p):
+def value_of(kind, mode, probe, dx, dtheta, q):
     """Event function: positive in the present mode, zero at its end."""
     if kind >= AT_LIMIT:
         left = probe[P_ROOM + kind - AT_LIMIT]
@@ -77,45 +81,43 @@ def value_of(kind, mode, probe, dx, dtheta, p):
         return -probe[P_DOWN]
     if kind == DEPTH:
         return probe[P_DEPTH] if mode.contact == 1 else -probe[P_DEPTH]
-    axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), p)
+    axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), q)
     if kind == TORSION_RATE:
         return rotary_rate if mode.torsion == FORWARD else -rotary_rate
     return axial_rate if mode.axial == DOWN else -axial_rate
 
 
 @numba.njit(cache=True, error_model="numpy")
-def value_on_step(settings, history, steps, mode, kind, s):
+def value_on_step(settings, history, steps, mode, kind, s, work):
     """Event function on the step that is written at place ``steps``, at s."""
-    state = state_at(history, steps, s)
-    probe = np.zeros(PROBES)
-    if kind != TORSION_RATE and kind != AXIAL_RATE:
-        y = np.empty(6)
-        for i in range(4):
-            y[i] = state[i]
-        for i in range(2):
-            y[4 + i] = cubic(history.real, ACTUATORS + 4 * i, steps, s)
-        t = history.real[steps, START] + s * history.real[steps, LENGTH]
-        rate_of_change(settings, history, steps, mode, t, y, np.empty(6), probe)
-    return value_of(kind, mode, probe, state[1], state[3], settings.p)
+    probe = work.stages[STAGES]
+    if kind in (TORSION_RATE, AXIAL_RATE):
+        state = state_at(history, steps, s)
+        return value_of(kind, mode, probe, state[1], state[3], settings.q)
+    y = work.vectors[BETWEEN]
+    recall(settings, history, steps, s, y)
+    t = history.real[steps, START] + s * history.real[steps, LENGTH]
+    rate_of_change(settings, history, steps, mode, t, y, work.rates[STAGES], probe)
+    return value_of(kind, mode, probe, y[1], y[3], settings.q)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cannot_vanish(kind, mode, stages, p, tolerance):
+def cannot_vanish(kind, mode, stages, q, tolerance):
     """Whether the stages of a step show an event function far from zero throughout."""
-    low, high = np.inf, -np.inf
-    for i in range(stages.shape[0]):
-        value = value_of(kind, mode, stages[i], stages[i, PROBES], stages[i, PROBES + 1], p)
+    low, high, probes = np.inf, -np.inf, stages.shape[1] - 2
+    for i in range(STAGES):
+        value = value_of(kind, mode, stages[i], stages[i, probes], stages[i, probes + 1], q)
         low, high = min(low, value), max(high, value)
     return low > tolerance and low > 0.5 * (high - low)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def root_between(settings, history, steps, mode, kind, a, fa, b, fb):
+def root_between(settings, history, steps, mode, kind, a, fa, b, fb, work):
     """Zero between a (positive) and b (negative) by the Illinois method."""
     side = 0
     for _ in range(80):
         c = (a * fb - b * fa) / (fb - fa)
-        fc = value_on_step(settings, history, steps, mode, kind, c)
+        fc = value_on_step(settings, history, steps, mode, kind, c, work)
         if fc > 0.0:
             a, fa = c, fc
             if side == 1:
@@ -132,7 +134,7 @@ def root_between(settings, history, steps, mode, kind, a, fa, b, fb):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def first_zero(settings, history, steps, mode, kind, stages):
+def first_zero(settings, history, steps, mode, kind, work):
     """First s at which an event function turns negative on the step just tried.
 
     The function is sampled and its interior minima are looked into, so that a pair of zeros
@@ -143,12 +145,12 @@ def first_zero(settings, history, steps, mode, kind, stages):
     float
         s in [0, 1]; 0 if the function is negative from the start, 2 if it never is.
     """
-    tolerance = 1e-12 * settings.scale[kind]
-    if cannot_vanish(kind, mode, stages, settings.p, tolerance):
+    tolerance = 1e-12 * settings.real[SCALE + kind]
+    if cannot_vanish(kind, mode, work.stages, settings.q, tolerance):
         return NONE
     values = np.empty(SAMPLES + 1)
     for i in range(SAMPLES + 1):
-        values[i] = value_on_step(settings, history, steps, mode, kind, i / SAMPLES)
+        values[i] = value_on_step(settings, history, steps, mode, kind, i / SAMPLES, work)
     for i in range(1, SAMPLES + 1):
         s, value = i / SAMPLES, values[i]
         left, left_value = (i - 1) / SAMPLES, values[i - 1]
@@ -157,22 +159,24 @@ def first_zero(settings, history, steps, mode, kind, stages):
             if bend > 0.0:
                 shift = 0.5 * (left_value - values[i + 1]) / bend
                 dip = s + shift / SAMPLES
-                dip_value = value_on_step(settings, history, steps, mode, kind, dip)
+                dip_value = value_on_step(settings, history, steps, mode, kind, dip, work)
                 if dip_value < value:
                     s, value = dip, dip_value
         if value >= -tolerance:
             continue
         if left_value > 0.0:
-            return root_between(settings, history, steps, mode, kind, left, left_value, s, value)
+            return root_between(
+                settings, history, steps, mode, kind, left, left_value, s, value, work
+            )
         if i > 1:
             return left
         # It starts from zero: is it positive anywhere before?
         for _ in range(30):
             middle = 0.5 * s
-            middle_value = value_on_step(settings, history, steps, mode, kind, middle)
+            middle_value = value_on_step(settings, history, steps, mode, kind, middle, work)
             if middle_value > 0.0:
                 return root_between(
-                    settings, history, steps, mode, kind, middle, middle_value, s, value
+                    settings, history, steps, mode, kind, middle, middle_value, s, value, work
                 )
             s, value = middle, middle_value
             if value >= -tolerance:

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numba
 
-from .data import LAST_LEVEL, LENGTH, LEVEL, START, STUCK, THETA, TORSION, X
+from .data import (
+    LAST_LEVEL,
+    LENGTH,
+    LEVEL,
+    START,
+    STUCK,
+    THETA,
+    TORSION,
+    X,
+)
 from .physics import rates, turned
 
 SOLVE_STEPS = 60
@@ -28,9 +37,9 @@ def quintic_slope(c, n, j, s):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cubic(c, n, j, s):
-    """Value at s of the cubic whose coefficients start in column n of row j."""
-    return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * c[j, n + 3]))
+def quartic(c, n, j, s):
+    """Value at s of the quartic whose coefficients start in column n of row j."""
+    return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * (c[j, n + 3] + s * c[j, n + 4])))
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -63,42 +72,33 @@ def fit_quintic(c, n, j, h, value, rate, rate_end, increment, curve, curve_end):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def fit_cubic(c, n, j, h, value, rate, rate_end, increment):
-    """Cubic through value and rate at both ends (Hermite)."""
-    d, e = increment - h * rate, h * (rate_end - rate)
-    c[j, n], c[j, n + 1] = value, h * rate
-    c[j, n + 2] = 3.0 * d - e
-    c[j, n + 3] = e - 2.0 * d
-
-
-@numba.njit(cache=True, error_model="numpy")
-def pitch_of(p):
+def pitch_of(q):
     """2π/n, from the plant's own condition on the delay."""
     zero = (0.0, 0.0, 0.0, 0.0)
-    return -turned(zero, zero, 0.0, p)
+    return -turned(zero, zero, 0.0, q)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def beyond(history, p, j, s, t, theta, extra):
+def beyond(history, q, j, s, t, theta, extra):
     """Angle from the bit's angle less the lag back to step j at s; positive if s is too early.
 
     ``extra`` is the lag in angle beyond 2π/n.
     """
     delay = t - history.real[j, START] - s * history.real[j, LENGTH]
     then = (0.0, 0.0, quintic(history.real, THETA, j, s), 0.0)
-    return turned((0.0, 0.0, theta, 0.0), then, delay, p) - extra
+    return turned((0.0, 0.0, theta, 0.0), then, delay, q) - extra
 
 
 @numba.njit(cache=True, error_model="numpy")
-def angle_slope(history, p, j, s):
+def angle_slope(history, q, j, s):
     """Angle turned per unit of s on step j."""
     h = history.real[j, LENGTH]
     rate = quintic_slope(history.real, THETA, j, s) / h
-    return h * rates((0.0, 0.0, 0.0, rate), p)[1]
+    return h * rates((0.0, 0.0, 0.0, rate), q)[1]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def locate_angle(history, p, steps, j, t, theta, extra):
+def locate_angle(history, q, steps, j, t, theta, extra):
     """Find the step and s at which the bit was a blade pitch (and ``extra``) back.
 
     The search starts at step j and stays within the smooth piece of the history that j
@@ -112,10 +112,10 @@ def locate_angle(history, p, steps, j, t, theta, extra):
     while (
         j > 0
         and history.whole[j, LEVEL] > LAST_LEVEL
-        and (beyond(history, p, j, 0.0, t, theta, extra) < 0.0)
+        and (beyond(history, q, j, 0.0, t, theta, extra) < 0.0)
     ):
         j -= 1
-    after = beyond(history, p, j, 1.0, t, theta, extra)
+    after = beyond(history, q, j, 1.0, t, theta, extra)
     while (
         after > 0.0
         and j + 1 < steps
@@ -123,9 +123,9 @@ def locate_angle(history, p, steps, j, t, theta, extra):
         and history.whole[j + 1, TORSION] != STUCK
     ):
         j += 1
-        after = beyond(history, p, j, 1.0, t, theta, extra)
+        after = beyond(history, q, j, 1.0, t, theta, extra)
     if after > 0.0 or j == 0:
-        slope = angle_slope(history, p, j, 1.0)
+        slope = angle_slope(history, q, j, 1.0)
         if j == 0:  # steady motion: linear, without end on either side
             return j, 1.0 + after / slope
         if j + 1 >= steps and after > 1e-9:
@@ -133,23 +133,23 @@ def locate_angle(history, p, steps, j, t, theta, extra):
         if after > 0.2 * slope:
             return j, 1.0
         s = 1.0 + after / slope
-        slope = angle_slope(history, p, j, s)
+        slope = angle_slope(history, q, j, s)
         if slope > 0.0:
-            s += beyond(history, p, j, s, t, theta, extra) / slope
+            s += beyond(history, q, j, s, t, theta, extra) / slope
         return j, min(max(s, 1.0), 1.3)
-    before = beyond(history, p, j, 0.0, t, theta, extra)
+    before = beyond(history, q, j, 0.0, t, theta, extra)
     if before <= 0.0:
         return j, 0.0
     # Newton inside a bracket; the slope is zero where the bit came to rest.
     low, high = 0.0, 1.0
     s = before / (before - after)
     for _ in range(SOLVE_STEPS):
-        value = beyond(history, p, j, s, t, theta, extra)
+        value = beyond(history, q, j, s, t, theta, extra)
         if value > 0.0:
             low = s
         else:
             high = s
-        slope = angle_slope(history, p, j, s)
+        slope = angle_slope(history, q, j, s)
         new = s + value / slope if slope > 0.0 else -1.0
         if new < low or new > high:
             new = 0.5 * (low + high)
@@ -189,15 +189,15 @@ def step_at(history, steps, time):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def step_before_angle(history, p, j, t, theta, extra, tolerance):
+def step_before_angle(history, q, j, t, theta, extra, tolerance):
     """Search from step j, across breaks, for the step in which the lagged angle lies next.
 
     At a break it is the step after it, since the bit goes on forward.
     """
-    while j > 0 and beyond(history, p, j, 0.0, t, theta, extra) < -tolerance:
+    while j > 0 and beyond(history, q, j, 0.0, t, theta, extra) < -tolerance:
         j -= 1
     while history.whole[j, TORSION] == STUCK or (
-        j > 0 and beyond(history, p, j, 1.0, t, theta, extra) >= -tolerance
+        j > 0 and beyond(history, q, j, 1.0, t, theta, extra) >= -tolerance
     ):
         j += 1
     return j

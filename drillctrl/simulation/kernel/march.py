@@ -21,8 +21,9 @@ from .data import (
     COLLAPSE,
     CURRENT_DELAY,
     DONE,
+    END,
     FEEDBACK,
-    KINDS,
+    INPUTS,
     LENGTH,
     LEVEL,
     LINEAR,
@@ -30,33 +31,37 @@ from .data import (
     MORE_ROOM,
     NO_BREAK,
     NOT_FINITE,
-    PROBES,
+    P_ROOM,
     RATE_FEEDBACK,
     REVERSE,
     REVERSED,
+    SCALE,
+    STAGES,
     START,
+    STATES,
     STUCK,
     TOO_DEEP,
     TORSION,
     Mode,
+    Work,
 )
 from .events import NONE, first_zero, value_on_step, watched
 from .interpolate import locate_time, step_at
 from .model import lag_of, rate_of_change
 from .physics import rates
-from .step import STAGE_COLUMNS, STAGES, attempt, record
+from .step import attempt, moving, record
 from .switch import next_mode, next_saturation, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
  REJECTED, EVALUATIONS, I_SATURATED, LAG0) = range(15)  # fmt: skip
-TIME, STEP, HELD0, HELD1, NEXT_SAMPLE = range(5)
+TIME, STEP, NEXT_SAMPLE = range(3)
 REFINE = 6
 SHORTEST = 1e-14
 
 
 @numba.njit(cache=True, error_model="numpy")
-def mode_of(ints, reals, chain):
+def mode_of(ints, chain):
     """Collect the present mode."""
     passes = ints[I_PASSES]
     return Mode(
@@ -73,20 +78,30 @@ def mode_of(ints, reals, chain):
         ints[PIECE],
         ints[GAINS],
         ints[ON],
-        reals[HELD0],
-        reals[HELD1],
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def enter(settings, history, steps, ints, reals, chain, kind, t, y):
+def workplace(settings):
+    """Arrays of the size of the plant."""
+    n, m = settings.whole[STATES], settings.whole[INPUTS]
+    probes, length = P_ROOM + 3 * m, n + 3 * m + 6
+    return Work(
+        np.zeros((STAGES + 1, n + m)),
+        np.zeros((STAGES + 1, probes + 2)),
+        np.zeros((3, length)),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def enter(settings, history, steps, ints, chain, kind, t, y, work):
     """Enter the mode that follows an event, a break or the start."""
-    mode = mode_of(ints, reals, chain)
-    if not AT_LIMIT <= kind < KINDS:
-        branch = next_mode(settings, history, steps, mode, kind, t, y)
+    mode = mode_of(ints, chain)
+    if kind < AT_LIMIT:
+        branch = next_mode(settings, history, steps, mode, kind, t, y, work)
         ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
-        mode = mode_of(ints, reals, chain)
-    ints[I_SATURATED] = next_saturation(settings, history, steps, mode, kind, t, y)
+        mode = mode_of(ints, chain)
+    ints[I_SATURATED] = next_saturation(settings, history, steps, mode, kind, t, y, work)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -94,7 +109,7 @@ def level_of(settings, kind):
     """Level of the break that an event makes; see `LAST_LEVEL`."""
     if kind < AT_LIMIT:
         return 2
-    return 4 if settings.flags[ACTUATOR] == 1 else 3
+    return 4 if settings.whole[ACTUATOR] == 1 else 3
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -119,7 +134,7 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
         lag = lag_of(settings, i, ints[GAINS])
         if lag == 0.0:
             continue
-        gain = 1 if i > 0 and settings.flags[RATE_FEEDBACK] == 1 else 2
+        gain = 1 if i > 0 and settings.whole[RATE_FEEDBACK] == 1 else 2
         b = following[MAX_FACE_LEVELS + i]
         # Breaks that several delays bring at once differ by rounding; no step fits in between.
         while b < steps and history.real[b, START] + lag <= t + SHORTEST * max(1.0, abs(t)):
@@ -141,23 +156,23 @@ def seek_past(settings, history, steps, ints, following, t):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def refine(settings, history, steps, mode, kind, t, s, y, k, new, increment, stages, level):
+def refine(settings, history, steps, mode, kind, t, s, y, work, level):
     """Repeat the step so that it ends where an event function vanishes; return its length."""
     h = s * history.real[steps, LENGTH]
     for _ in range(REFINE):
-        attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
-        record(settings, history, steps, mode, t, h, y, k, new, increment, level)
-        value = value_on_step(settings, history, steps, mode, kind, 1.0)
-        if abs(value) <= 1e-11 * settings.scale[kind]:
+        attempt(settings, history, steps, mode, t, h, y, work)
+        record(settings, history, steps, mode, t, h, y, work, level)
+        value = value_on_step(settings, history, steps, mode, kind, 1.0, work)
+        if abs(value) <= 1e-11 * settings.real[SCALE + kind]:
             break
-        before = value_on_step(settings, history, steps, mode, kind, 0.98)
+        before = value_on_step(settings, history, steps, mode, kind, 0.98, work)
         slope = (value - before) / (0.02 * h)
         change = -value / slope
         if not abs(change) < 0.1 * h:
             break
         h += change
-    attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
-    record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+    attempt(settings, history, steps, mode, t, h, y, work)
+    record(settings, history, steps, mode, t, h, y, work, level)
     return h
 
 
@@ -171,8 +186,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         See there.
     ints, reals, chain, following : array
         Where the march stands; changed in place.
-    y : array, (6,)
-        State now; changed in place.
+    y : array
+        Vector of `Settings` now; changed in place.
     end, max_step : float
         Time to stop at, and longest step.
 
@@ -181,13 +196,16 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
     int
         Why it stopped: DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
     """
-    p = settings.p
-    linear = settings.flags[LINEAR] == 1
+    q, size = settings.q, moving(settings)
+    linear = settings.whole[LINEAR] == 1
     first_kind = AT_LIMIT if linear else 0
-    last_kind = KINDS if settings.flags[FEEDBACK] == 1 else AT_LIMIT
-    k, stages = np.zeros((STAGES, 6)), np.zeros((STAGES, STAGE_COLUMNS))
-    new, increment, probe = np.zeros(6), np.zeros(6), np.zeros(PROBES)
-    zero_rates = rates((0.0, 0.0, 0.0, 0.0), p)
+    kinds = AT_LIMIT
+    if settings.whole[FEEDBACK] == 1:
+        kinds += 2 * settings.whole[INPUTS]
+    work = workplace(settings)
+    k, stages, new = work.rates, work.stages, work.vectors[END]
+    probes = stages.shape[1] - 2
+    zero_rates = rates((0.0, 0.0, 0.0, 0.0), q)
     known = False  # whether the rates at the start of the step are
     while True:
         t, steps = reals[TIME], ints[STEPS]
@@ -197,20 +215,18 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             return MORE_ROOM
         if ints[I_TORSION] == REVERSE:
             return REVERSED
-        mode = mode_of(ints, reals, chain)
+        mode = mode_of(ints, chain)
         level = ints[I_LEVEL]
         if not known:
-            rate_of_change(settings, history, steps, mode, t, y, k[0], probe)
-            for i in range(PROBES):
-                stages[0, i] = probe[i]
-            stages[0, PROBES], stages[0, PROBES + 1] = y[1], y[3]
+            rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+            stages[0, probes], stages[0, probes + 1] = y[1], y[3]
             known = True
 
         goal, longest = time_limits(settings, history, steps, ints, following, t)
         goal = min(goal, end, next_clock(settings, ints, reals, t))
         near, front = np.inf, np.inf
         if not linear:
-            near, front = angle_limits(history, p, steps, mode, chain, following, t, y, k[0, 3])
+            near, front = angle_limits(history, q, steps, mode, chain, following, t, y, k[0, 3])
         h = min(reals[STEP], longest, front, max_step)
         aim = near <= 1.02 * h
         if aim:
@@ -223,7 +239,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             return COLLAPSE
         h = max(h, 1e-15 * max(1.0, abs(t)))
 
-        error = attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
+        error = attempt(settings, history, steps, mode, t, h, y, work)
         ints[EVALUATIONS] += STAGES
         if error != error:
             if h < 1e-10:
@@ -236,7 +252,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             if reals[STEP] < SHORTEST * max(1.0, abs(t)):
                 return COLLAPSE
             continue
-        record(settings, history, steps, mode, t, h, y, k, new, increment, level)
+        record(settings, history, steps, mode, t, h, y, work, level)
         wanted = h * min(5.0, 0.9 * max(error, 1e-8) ** -0.2)
         if not (aim or at_goal) or wanted < reals[STEP]:
             reals[STEP] = wanted
@@ -244,13 +260,13 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         # End at the break that the lag in angle has met.
         reached = -1
         if not linear and mode.torsion != STUCK:
-            size = 1.0 + abs(new[2]) + zero_rates[1] * abs(t)
+            turns = 1.0 + abs(new[2]) + zero_rates[1] * abs(t)
             for _ in range(REFINE):
-                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
-                if abs(left) <= 4e-15 * size:
+                left, which = least_angle_left(history, q, steps, mode, following, t + h, new[2])
+                if abs(left) <= 4e-15 * turns:
                     reached = which
                     break
-                rate = rates((0.0, 0.0, 0.0, new[3]), p)[1]
+                rate = rates((0.0, 0.0, 0.0, new[3]), q)[1]
                 if which < 0 or rate <= 0.0 or (left > 0.0 and not left < 0.1 * h * rate):
                     break
                 if t + h + left / rate >= goal + 1e-15:
@@ -261,19 +277,19 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                     break
                 h += change
                 at_goal = False
-                attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages)
-                record(settings, history, steps, mode, t, h, y, k, new, increment, level)
-                left, which = least_angle_left(history, p, steps, mode, following, t + h, new[2])
-            if reached < 0 and which >= 0 and left < -1e-9 * size:
+                attempt(settings, history, steps, mode, t, h, y, work)
+                record(settings, history, steps, mode, t, h, y, work, level)
+                left, which = least_angle_left(history, q, steps, mode, following, t + h, new[2])
+            if reached < 0 and which >= 0 and left < -1e-9 * turns:
                 reals[STEP] = 0.5 * h
                 ints[REJECTED] += 1
                 continue
 
         # End at the first event.
         kind, where = -1, NONE
-        for candidate in range(first_kind, last_kind):
+        for candidate in range(first_kind, kinds):
             if watched(settings, candidate, mode):
-                s = first_zero(settings, history, steps, mode, candidate, stages)
+                s = first_zero(settings, history, steps, mode, candidate, work)
                 if s < where:
                     kind, where = candidate, s
         if kind >= 0:
@@ -282,25 +298,20 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 ints[STALLS] += 1
                 if ints[STALLS] > 20:
                     return COLLAPSE
-                snap(kind, y, p)
-                enter(settings, history, steps, ints, reals, chain, kind, t, y)
+                snap(kind, y, q)
+                enter(settings, history, steps, ints, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
                 known = False
                 continue
             if where < 1.0:
-                h = refine(
-                    settings, history, steps, mode, kind, t, where, y, k, new, increment,
-                    stages, level,
-                )  # fmt: skip
+                h = refine(settings, history, steps, mode, kind, t, where, y, work, level)
                 reached, at_goal = -1, False
         ints[STALLS] = 0
 
         # Accept.
         t = goal if at_goal else t + h
-        for i in range(4):
+        for i in range(size):
             y[i] = new[i]
-        if settings.flags[ACTUATOR] == 1:
-            y[4], y[5] = new[4], new[5]
         steps += 1
         ints[STEPS], reals[TIME] = steps, t
         level = pass_time_breaks(settings, history, steps, ints, following, t)
@@ -308,7 +319,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             follow(settings, history, steps, mode, chain, t, y[2])
         if reached >= 0:
             b = following[reached]
-            gain = 1 if settings.flags[RATE_FEEDBACK] + settings.flags[CURRENT_DELAY] == 2 else 2
+            gain = 1 if settings.whole[RATE_FEEDBACK] + settings.whole[CURRENT_DELAY] == 2 else 2
             stuck = history.whole[b, TORSION] == STUCK
             level = min(level, passed_on(history.whole[b, LEVEL], stuck, gain))
             chain[reached] = b
@@ -316,23 +327,23 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, y[2], tolerance)
             if ints[I_PASSES] > MAX_FACE_LEVELS:
                 return TOO_DEEP
-            follow(settings, history, steps, mode_of(ints, reals, chain), chain, t, y[2])
+            follow(settings, history, steps, mode_of(ints, chain), chain, t, y[2])
         gains = ints[GAINS]
-        if take_sample(settings, history, steps, ints, reals, t):
+        if take_sample(settings, history, steps, ints, reals, t, y):
             level = 2
             if ints[GAINS] != gains:
                 seek_past(settings, history, steps, ints, following, t)
         if kind >= 0:
-            snap(kind, y, p)
+            snap(kind, y, q)
             level = min(level, level_of(settings, kind))
         # The last stage is the first of the next step, unless something breaks there.
         known = level == NO_BREAK and reached < 0
         if known:
-            for i in range(6):
+            for i in range(size):
                 k[0, i] = k[STAGES - 1, i]
-            for i in range(STAGE_COLUMNS):
+            for i in range(probes + 2):
                 stages[0, i] = stages[STAGES - 1, i]
         if kind >= 0 or level <= 2:
             cause = kind if kind >= 0 else BARRIER
-            enter(settings, history, steps, ints, reals, chain, cause, t, y)
+            enter(settings, history, steps, ints, chain, cause, t, y, work)
         ints[I_LEVEL] = level

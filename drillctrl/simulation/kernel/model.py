@@ -1,4 +1,4 @@
-"""The motion on one smooth branch: delayed signals, control, loads, accelerations."""
+"""The motion on one smooth branch: delayed signals, control, loads, rates of change."""
 
 from __future__ import annotations
 
@@ -6,17 +6,26 @@ import numba
 
 from .data import (
     ACTUATOR,
+    BY_TORQUE,
+    BY_WEIGHT,
     CURRENT_DELAY,
+    CUT,
     DOWN,
     DRIVE_STRENGTH,
     DRIVE_T,
     DRIVE_THETA,
     DRIVE_X,
+    FED,
     FEEDBACK,
     HELD,
+    INPUTS,
     LAG_TIME,
+    LAGS,
     LENGTH,
+    LIMITS,
     LINEAR,
+    OTHERS,
+    OUTPUTS,
     P_DELAY,
     P_DEPTH,
     P_DOWN,
@@ -24,22 +33,28 @@ from .data import (
     P_PRESSED,
     P_REVERSE,
     P_ROOM,
-    P_U0,
-    P_U1,
+    P_TORQUE,
     P_UP,
+    P_WEIGHT,
+    PAST,
     PAST_AGE,
+    QUARTIC,
     REVERSE,
+    ROWS,
     SAMPLED,
     START,
+    STATES,
     STUCK,
+    TORQUE,
+    WEIGHT,
 )
-from .interpolate import locate_angle, locate_time, pitch_of, state_at
-from .physics import acceleration, depth
+from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
+from .physics import depth, load, rates
 
 
 @numba.njit(cache=True, error_model="numpy")
 def top_at(drive, piece, t):
-    """Motion of the top end beyond V0 t and Ω0 t: (x, θ) and their rates."""
+    """Motion of the top end beyond V0 t and Ω0 t: x, x', θ, θ'."""
     dt = t - drive[piece, DRIVE_T]
     x, theta = DRIVE_X, DRIVE_THETA
     return (
@@ -69,22 +84,57 @@ def piece_at(times, t):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def measured(drive, state, t):
-    """State as the controller sees it: beyond what the top end has been told to do."""
-    if drive.shape[0] == 1:
-        return state
-    k = piece_at(drive[:, DRIVE_T], t)
-    top = top_at(drive, k, t)
-    return (state[0] - top[0], state[1] - top[1], state[2] - top[2], state[3] - top[3])
+def row_of(whole, value, i, y):
+    """Row i of the matrix of `Settings` times y."""
+    total = 0.0
+    for e in range(whole[ROWS + i], whole[ROWS + i + 1]):
+        total += value[e] * y[whole[e]]
+    return total
 
 
 @numba.njit(cache=True, error_model="numpy")
-def command(rows, gains, now, then, i):
-    """K1 Y + K2 Y_delayed for input i (Eqs. 36, 38)."""
-    u = 0.0
-    for k in range(4):
-        u += rows[gains, 1 + 4 * i + k] * now[k] + rows[gains, 9 + 4 * i + k] * then[k]
-    return u
+def noise_of(noise, sample, f):
+    """Noise of the output that is fed back in place f, in the sample that measured it."""
+    count = noise.shape[0]
+    return 0.0 if sample < 0 or count == 0 else noise[min(sample, count - 1), f]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_earlier(settings, history, which, row, place, sample, y):
+    """Add to the places of u what gains give on the outputs at an earlier instant.
+
+    ``place`` is the instant, the step it lies on and where; a negative ``sample`` has no noise.
+    """
+    whole, value, gains = settings.whole, settings.value, settings.gains
+    n, m = whole[STATES], whole[INPUTS]
+    time, j, s = place
+    state, moved = state_at(history, j, s), (0.0, 0.0, 0.0, 0.0)
+    if settings.drive.shape[0] > 1:
+        moved = top_at(settings.drive, piece_at(settings.drive[:, DRIVE_T], time), time)
+    for f in range(gains.shape[3]):
+        k = whole[whole[FED] + f]
+        total = noise_of(settings.noise, sample, f)
+        for e in range(whole[ROWS + n + k], whole[ROWS + n + k + 1]):
+            i = whole[e]
+            if i < 4:
+                total += value[e] * state[i]
+            elif i < n:
+                total += value[e] * quartic(history.real, OTHERS + QUARTIC * (i - 4), j, s)
+            else:
+                total += value[e] * moved[i - n - 3 * m]
+        for i in range(m):
+            y[n + 2 * m + i] += gains[which, row, i, f] * total
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_present(settings, which, row, y):
+    """Add to the places of u what gains give on the outputs now."""
+    whole, gains = settings.whole, settings.gains
+    n, m = whole[STATES], whole[INPUTS]
+    for f in range(gains.shape[3]):
+        output = row_of(whole, settings.value, n + whole[whole[FED] + f], y)
+        for i in range(m):
+            y[n + 2 * m + i] += gains[which, row, i, f] * output
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -97,56 +147,58 @@ def within(value, limit):
 def lag_of(settings, i, gains):
     """Constant delays: of the linear model, the measured and the fed back signal; 0: none."""
     if i < 2:
-        return settings.lags[i]
-    return 0.0 if settings.flags[SAMPLED] == 1 else settings.gains[gains, PAST_AGE]
+        return settings.real[LAGS + i]
+    return 0.0 if settings.whole[SAMPLED] == 1 else settings.schedule[gains, PAST_AGE]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def wanted_at(settings, history, steps, mode, t, state, lagged):
-    """Command of the controller at t before its limits."""
-    flags = settings.flags
-    if flags[SAMPLED] == 1:
-        return mode.held0, mode.held1
-    now, t_now = state, t
-    if settings.lags[1] > 0.0:
-        t_now = t - settings.lags[1]
-        j, s = locate_time(history, steps, mode.lag1, t_now)
-        now = state_at(history, j, s)
-    then, t_then = now, t_now
-    if flags[CURRENT_DELAY] == 1:
-        then, t_then = (lagged[0], lagged[1], lagged[2], lagged[3]), t - lagged[4]
-    elif lag_of(settings, 2, mode.gains) > 0.0:
-        t_then = t - lag_of(settings, 2, mode.gains)
-        j, s = locate_time(history, steps, mode.lag2, t_then)
-        then = state_at(history, j, s)
-    now = measured(settings.drive, now, t_now)
-    then = measured(settings.drive, then, t_then)
-    return (
-        command(settings.gains, mode.gains, now, then, 0),
-        command(settings.gains, mode.gains, now, then, 1),
-    )
+def command_at(settings, history, steps, mode, t, y, place):
+    """Write the command of the controller at t, before its limits, into the places of u."""
+    n, m = settings.whole[STATES], settings.whole[INPUTS]
+    u = n + 2 * m
+    if settings.whole[SAMPLED] == 1:
+        for i in range(m):
+            y[u + i] = y[n + m + i]
+        return
+    age = settings.real[LAGS + 1]
+    for which in range(1 + settings.whole[PAST]):
+        current = which == 1 and settings.whole[CURRENT_DELAY] == 1
+        near = mode.lag1
+        if which == 1 and lag_of(settings, 2, mode.gains) > 0.0:
+            age, near = lag_of(settings, 2, mode.gains), mode.lag2
+        if age > 0.0 and not current:
+            j, s = locate_time(history, steps, near, t - age)
+            place = t - age, j, s
+        if age > 0.0 or current:
+            add_earlier(settings, history, which, mode.gains, place, -1, y)
+        else:
+            add_present(settings, which, mode.gains, y)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe):
-    """Inputs to the plant at t: commands, or actuators that follow them with a lag (Eq. 36).
+def feed_back(settings, history, steps, mode, t, y, place, out, probe):
+    """Write the inputs to the plant at t: commands, or actuators that follow with a lag (Eq. 36).
 
     Commands and rates of actuators are held within their limits here; the probe takes what
     is left of these, so that an event can meet them.
     """
-    wanted = (0.0, 0.0)
+    n, m, real = settings.whole[STATES], settings.whole[INPUTS], settings.real
+    u = n + 2 * m
+    for i in range(m):
+        y[u + i] = 0.0
     if mode.on == 1:
-        wanted = wanted_at(settings, history, steps, mode, t, state, lagged)
-    limit = settings.limit
-    probe[P_ROOM], probe[P_ROOM + 1] = limit[0] - abs(wanted[0]), limit[1] - abs(wanted[1])
-    u = within(wanted[0], limit[0]), within(wanted[1], limit[1])
-    if settings.flags[ACTUATOR] == 0:
-        return u
-    for i in range(2):
-        slew = (u[i] - y[4 + i]) / settings.control[LAG_TIME]
-        probe[P_ROOM + 2 + i] = settings.rate[i] - abs(slew)
-        out[4 + i] = within(slew, settings.rate[i])
-    return y[4], y[5]
+        command_at(settings, history, steps, mode, t, y, place)
+    for i in range(m):
+        wanted = y[u + i]
+        probe[P_ROOM + i] = real[LIMITS + i] - abs(wanted)
+        value = within(wanted, real[LIMITS + i])
+        if settings.whole[ACTUATOR] == 1:
+            slew = (value - y[n + i]) / settings.real[LAG_TIME]
+            probe[P_ROOM + m + i] = real[LIMITS + m + i] - abs(slew)
+            out[n + i] = within(slew, real[LIMITS + m + i])
+            value = y[n + i]
+        y[u + i] = value
+        probe[P_ROOM + 2 * m + i] = value
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -155,93 +207,127 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
 
     Parameters
     ----------
-    y, out : array, (6,)
-        x, x', θ, θ' and the two actuator states; their rates of change.
-    probe : array, (13,)
-        Takes depth, accelerations at the limits of what contact can bear, delay, inputs.
+    y : array
+        The vector of `Settings`; its places of u and top are written here.
+    out : array
+        Takes the rates of change of states and actuators.
+    probe : array
+        Takes depth, accelerations at the limits of what contact can bear, loads, delay, inputs.
     """
-    p = settings.p
+    q, n = settings.q, settings.whole[STATES]
     state = (y[0], y[1], y[2], y[3])
-    if settings.flags[LINEAR] == 1:
+    if settings.whole[LINEAR] == 1:
         return linear_rate(settings, history, steps, mode, t, y, out, probe)
-    j, s = locate_angle(history, p, steps, mode.lag, t, y[2], 0.0)
+    j, s = locate_angle(history, q, steps, mode.lag, t, y[2], 0.0)
     if j < 0:
         return False
-    then = state_at(history, j, s)
     delay = t - history.real[j, START] - s * history.real[j, LENGTH]
-    face, since = then, delay
+    place = t - delay, j, s
+    since = delay
     if mode.passes > 1:
-        extra = (mode.passes - 1) * pitch_of(p)
-        j, s = locate_angle(history, p, steps, mode.face, t, y[2], extra)
-        face = state_at(history, j, s)
+        extra = (mode.passes - 1) * pitch_of(q)
+        j, s = locate_angle(history, q, steps, mode.face, t, y[2], extra)
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
-    d = depth(state, face, since, p)
-    lagged = (then[0], then[1], then[2], then[3], delay)
-    u = (0.0, 0.0)
-    if settings.flags[FEEDBACK] == 1:
-        u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
-    top, strength = (0.0, 0.0), 1.0
+    d = depth(state, state_at(history, j, s), since, q)
+    strength = 1.0
     if settings.drive.shape[0] > 1:
-        moved = top_at(settings.drive, mode.piece, t)
-        top = (moved[0], moved[2])
+        moved, top = top_at(settings.drive, mode.piece, t), n + 3 * settings.whole[INPUTS]
+        y[top], y[top + 1], y[top + 2], y[top + 3] = moved
         strength = strength_at(settings.drive, mode.piece, t)
-    out[0], out[2] = y[1], y[3]
-    probe[P_DEPTH], probe[P_DELAY], probe[P_U0], probe[P_U1] = d, delay, u[0], u[1]
-    out[1], out[3] = branch_acceleration(
-        state, u, top, strength * d, mode.contact, mode.torsion, mode.axial, p, probe
+    if settings.whole[FEEDBACK] == 1:
+        feed_back(settings, history, steps, mode, t, y, place, out, probe)
+    probe[P_DEPTH], probe[P_DELAY] = d, delay
+    excess = n + 3 * settings.whole[INPUTS] + 4
+    y[excess], y[excess + 1] = 0.0, 0.0
+    weight, torque = bit_load(
+        row_of(settings.whole, settings.value, 1, y),
+        row_of(settings.whole, settings.value, 3, y),
+        strength * d,
+        rates(state, q),
+        mode.contact,
+        mode.torsion,
+        mode.axial,
+        settings.real,
+        settings.q,
+        probe,
     )
+    y[excess] = weight - settings.real[WEIGHT]
+    y[excess + 1] = torque - settings.real[TORQUE]
+    for i in range(n):
+        out[i] = row_of(settings.whole, settings.value, i, y)
+    # What is held does not move by rounding either.
+    if mode.torsion == STUCK:
+        out[3] = 0.0
+    if mode.contact == 1 and mode.axial == HELD:
+        out[1] = 0.0
     return True
 
 
 @numba.njit(cache=True, error_model="numpy")
-def branch_acceleration(state, u, top, cut, contact, torsion, axial, p, probe):
-    """x'' and θ'' in a mode, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
+def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, probe):
+    """Weight and torque on q, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
     At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
     torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5).
+
+    Parameters
+    ----------
+    axial, angular : float
+        Accelerations of the bit under the load of steady drilling.
+    cut : float
+        Depth that is cut in contact, times the strength of the rock.
+    speeds : tuple
+        Z' and Φ'.
+    contact, torsion, direction : int
+        The mode; ``direction`` is the axial one.
+    real, q : array, tuple
+        As in `Settings`.
+    probe : array
+        Takes the loads, and the accelerations at the ends of what they can be.
     """
-    direction = -1.0 if torsion == REVERSE else 1.0
-    if contact == 0 or torsion == REVERSE:
-        cut = 0.0
-    up, _ = acceleration(state, u, top, (cut, 0.0, direction), p)
-    pressed = 0.0
-    probe[P_UP] = up
+    by_weight, by_torque = real[BY_WEIGHT], real[BY_TORQUE]
+    axial -= by_weight * real[WEIGHT]
+    angular -= by_torque * real[TORQUE]
+    weight, torque, pressed = 0.0, 0.0, 0.0
     if contact == 1:
-        down, _ = acceleration(state, u, top, (cut, 1.0, direction), p)
-        probe[P_DOWN] = down
-        if axial == DOWN:
+        sign = 1.0
+        if torsion == REVERSE:
+            sign, cut = -1.0, 0.0
+        light = load((cut, 0.0, sign), speeds, q)
+        full = load((cut, 1.0, sign), speeds, q)
+        up, down = axial + by_weight * light[0], axial + by_weight * full[0]
+        probe[P_UP], probe[P_DOWN] = up, down
+        if direction == DOWN:
             pressed = 1.0
-        elif axial == HELD:
+            weight, torque = full
+        elif direction == HELD:
             pressed = up / (up - down) if up != down else 0.0
-    probe[P_PRESSED] = pressed
-    ax, at = acceleration(state, u, top, (cut, pressed, direction), p)
-    probe[P_FORWARD] = at
+            weight = light[0] + pressed * (full[0] - light[0])
+            torque = light[1] + pressed * (full[1] - light[1])
+        else:
+            weight, torque = light
+    probe[P_FORWARD] = angular + by_torque * torque
     if torsion == STUCK:
-        _, probe[P_REVERSE] = acceleration(state, u, top, (0.0, pressed, -1.0), p)
-        at = 0.0
-    if contact == 1 and axial == HELD:
-        ax = 0.0
-    return ax, at
+        back = 0.0
+        if contact == 1:
+            back = load((0.0, pressed, -1.0), speeds, q)[1]
+        probe[P_REVERSE] = angular + by_torque * back
+        torque = -angular / by_torque
+    probe[P_PRESSED], probe[P_WEIGHT], probe[P_TORQUE] = pressed, weight, torque
+    return weight, torque
 
 
 @numba.njit(cache=True, error_model="numpy")
 def linear_rate(settings, history, steps, mode, t, y, out, probe):
     """Right-hand side of the linear model (Eqs. 22, 34)."""
-    j, s = locate_time(history, steps, mode.lag0, t - settings.lags[0])
-    then = state_at(history, j, s)
-    state = (y[0], y[1], y[2], y[3])
-    lagged = (then[0], then[1], then[2], then[3], settings.lags[0])
-    u = (0.0, 0.0)
-    if settings.flags[FEEDBACK] == 1:
-        u = inputs_at(settings, history, steps, mode, t, y, state, lagged, out, probe)
-    rows = settings.linear
-    d = rows[4, 8]  # 2πδ0
-    for i in range(4):
-        total = rows[i, 8] * u[0] + rows[i, 9] * u[1]
-        for k in range(4):
-            total += rows[i, k] * state[k] + rows[i, 4 + k] * then[k]
-        out[i] = total
-        d += rows[4, i] * state[i] + rows[4, 4 + i] * then[i]
-    probe[P_DEPTH], probe[P_DELAY] = d, settings.lags[0]
-    probe[P_U0], probe[P_U1], probe[P_PRESSED] = u[0], u[1], 1.0
+    n, lag = settings.whole[STATES], settings.real[LAGS + 0]
+    then = n + 3 * settings.whole[INPUTS]
+    j, s = locate_time(history, steps, mode.lag0, t - lag)
+    y[then], y[then + 1], y[then + 2], y[then + 3] = state_at(history, j, s)
+    if settings.whole[FEEDBACK] == 1:
+        feed_back(settings, history, steps, mode, t, y, (t - lag, j, s), out, probe)
+    for i in range(n):
+        out[i] = row_of(settings.whole, settings.value, i, y)
+    d = settings.real[CUT] + row_of(settings.whole, settings.value, n + settings.whole[OUTPUTS], y)
+    probe[P_DEPTH], probe[P_DELAY], probe[P_PRESSED] = d, lag, 1.0
     return True

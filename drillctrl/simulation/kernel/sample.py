@@ -6,38 +6,43 @@ import numba
 import numpy as np
 
 from .data import (
-    ACTUATOR,
-    ACTUATORS,
     AXIAL,
+    C_CONTACT,
+    C_DELAY,
+    C_DEPTH,
+    C_PRESSED,
+    C_STATES,
+    C_TORQUE,
+    C_WEIGHT,
     CONTACT,
     DRIVE_T,
     FACE,
     FEEDBACK,
     HELD,
-    HELD_U,
+    INPUTS,
     LAG,
     LENGTH,
     LINEAR,
     P_DELAY,
     P_DEPTH,
-    P_FORWARD,
     P_PRESSED,
-    P_U0,
+    P_ROOM,
+    P_TORQUE,
+    P_WEIGHT,
     PASSES,
-    PROBES,
-    REVERSE,
     SATURATED,
+    SINCE,
     START,
+    STATES,
     STUCK,
     T_ON,
     TORSION,
     Mode,
 )
-from .interpolate import cubic, state_at, step_at
-from .model import lag_of, piece_at, rate_of_change, strength_at
+from .interpolate import step_at
+from .model import lag_of, piece_at, rate_of_change, row_of
 from .physics import load, rates
-
-COLUMNS = 14
+from .step import recall
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -45,7 +50,7 @@ def mode_on(settings, history, j):
     """The mode in which step j was taken."""
     t = history.real[j, START] + 0.5 * history.real[j, LENGTH]
     lags = np.zeros(3, np.int64)
-    gains = piece_at(settings.gains[:, 0], t)
+    gains = piece_at(settings.schedule[:, SINCE], t)
     for i in range(3):
         lag = lag_of(settings, i, gains)
         if lag > 0.0:
@@ -63,50 +68,58 @@ def mode_on(settings, history, j):
         lags[2],
         piece_at(settings.drive[:, DRIVE_T], t),
         gains,
-        1 if settings.flags[FEEDBACK] == 1 and t >= settings.control[T_ON] else 0,
-        history.real[j, HELD_U],
-        history.real[j, HELD_U + 1],
+        1 if settings.whole[FEEDBACK] == 1 and t >= settings.real[T_ON] else 0,
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def evaluate(settings, history, steps, places, times):
-    """Return everything at some instants, each on a given step, shape (len(times), 14).
+def evaluate(settings, history, steps, places, times, wanted):
+    """Return some columns at some instants, each on a given step, (len(wanted), len(times)).
 
-    Columns: x, x', θ, θ', x'', θ'', τ, depth of cut, share of the wear-flat force, weight on
-    bit, torque on bit, both inputs, contact.
+    ``wanted`` are places in `sample_columns`.
     """
-    result = np.zeros((times.shape[0], COLUMNS))
-    y, out, probe = np.zeros(6), np.zeros(6), np.zeros(PROBES)
+    n, m = settings.whole[STATES], settings.whole[INPUTS]
+    result = np.zeros((wanted.shape[0], times.shape[0]))
+    y, out, probe = np.zeros(n + 3 * m + 6), np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
     # At rest the velocity is known; its interpolation is off by rounding.
-    standing = rates((0.0, 0.0, 0.0, 0.0), settings.p)
+    standing = rates((0.0, 0.0, 0.0, 0.0), settings.q)
+    linear = settings.whole[LINEAR] == 1
     for i in range(times.shape[0]):
         j, t = places[i], times[i]
         mode = mode_on(settings, history, j)
         s = (t - history.real[j, START]) / history.real[j, LENGTH]
-        state = state_at(history, j, s)
-        for n in range(4):
-            y[n] = state[n]
-        if settings.flags[LINEAR] == 0:
+        recall(settings, history, j, s, y)
+        if not linear:
             if mode.torsion == STUCK:
                 y[3] = -standing[1]
             if mode.contact == 1 and mode.axial == HELD:
                 y[1] = -standing[0]
-        if settings.flags[ACTUATOR] == 1:
-            for n in range(2):
-                y[4 + n] = cubic(history.real, ACTUATORS + 4 * n, j, s)
         rate_of_change(settings, history, steps, mode, t, y, out, probe)
-        strength = strength_at(settings.drive, mode.piece, t)
-        cut = strength * probe[P_DEPTH] if mode.contact == 1 and mode.torsion != REVERSE else 0.0
-        pressed = probe[P_PRESSED] if mode.contact == 1 else 0.0
-        direction = -1.0 if mode.torsion == REVERSE else 1.0
-        weight, torque = load((cut, pressed, direction), settings.p)
-        if mode.torsion == STUCK and settings.flags[LINEAR] == 0:
-            torque += probe[P_FORWARD]  # what is offered is what the rock bears
-        result[i, 0:4] = y[0:4]
-        result[i, 4], result[i, 5] = out[1], out[3]
-        result[i, 6], result[i, 7], result[i, 8] = probe[P_DELAY], probe[P_DEPTH], pressed
-        result[i, 9], result[i, 10] = weight, torque
-        result[i, 11], result[i, 12] = probe[P_U0], probe[P_U0 + 1]
-        result[i, 13] = mode.contact
+        if linear:
+            speeds = rates((y[0], y[1], y[2], y[3]), settings.q)
+            probe[P_WEIGHT], probe[P_TORQUE] = load((probe[P_DEPTH], 1.0, 1.0), speeds, settings.q)
+        for c in range(wanted.shape[0]):
+            which = wanted[c]
+            if which >= C_STATES:
+                k = which - C_STATES
+                if k < n:
+                    result[c, i] = y[k]
+                elif k < 2 * n:
+                    result[c, i] = out[k - n]
+                elif k < 2 * n + m:
+                    result[c, i] = probe[P_ROOM + 2 * m + k - 2 * n]
+                else:
+                    result[c, i] = row_of(settings.whole, settings.value, k - n - m, y)
+            elif which == C_DELAY:
+                result[c, i] = probe[P_DELAY]
+            elif which == C_DEPTH:
+                result[c, i] = probe[P_DEPTH]
+            elif which == C_PRESSED:
+                result[c, i] = probe[P_PRESSED]
+            elif which == C_WEIGHT:
+                result[c, i] = probe[P_WEIGHT]
+            elif which == C_TORQUE:
+                result[c, i] = probe[P_TORQUE]
+            elif which == C_CONTACT:
+                result[c, i] = mode.contact
     return result

@@ -1,7 +1,9 @@
 """One step of the Dormand-Prince pair of order 5(4), and its dense output.
 
-Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26. The dense output is the
-quintic through value, rate and acceleration at both ends, which the pair has at no cost.
+Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26. The dense output of the
+bit is the quintic through value, rate and acceleration at both ends, which the pair has at no
+cost; that of all else is the pair's continuous extension of order 4 (Shampine, Math. Comput.
+46 (1986) 135-150).
 """
 
 from __future__ import annotations
@@ -11,24 +13,30 @@ import numpy as np
 
 from .data import (
     ACTUATOR,
-    ACTUATORS,
+    ATOL,
     AXIAL,
     CONTACT,
+    END,
     FACE,
-    HELD_U,
+    INCREMENT,
+    INPUTS,
     LAG,
     LENGTH,
     LEVEL,
+    OTHERS,
     P_DEPTH,
     PASSES,
-    PROBES,
+    QUARTIC,
+    RTOL,
     SATURATED,
+    STAGES,
     START,
+    STATES,
     THETA,
     TORSION,
     X,
 )
-from .interpolate import fit_cubic, fit_quintic
+from .interpolate import fit_quintic, quartic, state_at
 from .model import rate_of_change
 
 NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
@@ -44,52 +52,90 @@ WEIGHTS = np.array(
     ]
 )
 ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
-STAGES = 7
-STAGE_COLUMNS = PROBES + 2
+# y(s) = y(0) + h Σ DENSE[i, q] s^(q + 1) k_i.
+DENSE = np.array(
+    [
+        [
+            1.0,
+            -8048581381 / 2820520608,
+            8663915743 / 2820520608,
+            -12715105075 / 11282082432,
+        ],
+        [0.0, 0.0, 0.0, 0.0],
+        [
+            0.0,
+            131558114200 / 32700410799,
+            -68118460800 / 10900136933,
+            87487479700 / 32700410799,
+        ],
+        [
+            0.0,
+            -1754552775 / 470086768,
+            14199869525 / 1410260304,
+            -10690763975 / 1880347072,
+        ],
+        [
+            0.0,
+            127303824393 / 49829197408,
+            -318862633887 / 49829197408,
+            701980252875 / 199316789632,
+        ],
+        [0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
+        [0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
+    ]
+)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages):
+def moving(settings):
+    """Number of entries of y that are integrated: states, and actuators if there are any."""
+    n = settings.whole[STATES]
+    return n + settings.whole[INPUTS] if settings.whole[ACTUATOR] == 1 else n
+
+
+@numba.njit(cache=True, error_model="numpy")
+def attempt(settings, history, steps, mode, t, h, y, work):
     """Try a step from t to t + h.
 
     Parameters
     ----------
-    y, new, increment : array, (6,)
-        State, state at the end, their difference.
-    k : array, (7, 6)
-        Rates at the stages; the first is given.
-    stages : array, (7, PROBES + 2)
-        Takes the probe of each stage but the first, with x' and θ' after it.
+    y : array
+        The vector of `Settings` at t.
+    work : Work
+        Rates and probe of the first stage are given; takes those of the others, and the
+        vector at the end.
 
     Returns
     -------
     float
         Largest ratio of error to tolerance; negative if a delayed instant is not known yet.
     """
-    size = 6 if settings.flags[ACTUATOR] == 1 else 4
-    probe = np.zeros(PROBES)
+    size, n, m = moving(settings), settings.whole[STATES], settings.whole[INPUTS]
+    k, stages = work.rates, work.stages
+    new, increment = work.vectors[END], work.vectors[INCREMENT]
+    probes = stages.shape[1] - 2
+    for i in range(n + m, n + 2 * m):
+        new[i] = y[i]
     for stage in range(1, STAGES):
         for i in range(size):
             total = 0.0
-            for m in range(stage):
-                total += WEIGHTS[stage, m] * k[m, i]
+            for q in range(stage):
+                total += WEIGHTS[stage, q] * k[q, i]
             increment[i] = h * total
             new[i] = y[i] + increment[i]
         known = rate_of_change(
-            settings, history, steps, mode, t + NODES[stage] * h, new, k[stage], probe
+            settings, history, steps, mode, t + NODES[stage] * h, new, k[stage], stages[stage]
         )
         if not known:
             return -1.0
-        for i in range(PROBES):
-            stages[stage, i] = probe[i]
-        stages[stage, PROBES] = new[1]
-        stages[stage, PROBES + 1] = new[3]
+        stages[stage, probes] = new[1]
+        stages[stage, probes + 1] = new[3]
     worst = 0.0
     for i in range(size):
         total = 0.0
-        for m in range(STAGES):
-            total += ERROR[m] * k[m, i]
-        allowed = settings.tolerance[1] + settings.tolerance[0] * max(abs(y[i]), abs(new[i]))
+        for q in range(STAGES):
+            total += ERROR[q] * k[q, i]
+        allowed = settings.real[ATOL] + settings.real[RTOL] * max(abs(y[i]), abs(new[i]))
         ratio = abs(h * total) / allowed
         if not ratio <= worst:  # also where it is no number
             worst = ratio
@@ -99,28 +145,37 @@ def attempt(settings, history, steps, mode, t, h, y, k, new, increment, stages):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def record(settings, history, j, mode, t, h, y, k, new, increment, level):
+def record(settings, history, j, mode, t, h, y, work, level):
     """Write a step into place j of the history."""
-    last = STAGES - 1
-    history.real[j, START], history.real[j, LENGTH] = t, h
-    fit_quintic(history.real, X, j, h, y[0], y[1], new[1], increment[0], k[0, 1], k[last, 1])
-    fit_quintic(history.real, THETA, j, h, y[2], y[3], new[3], increment[2], k[0, 3], k[last, 3])
-    if settings.flags[ACTUATOR] == 1:
-        for i in range(2):
-            n = 4 + i
-            fit_cubic(
-                history.real, ACTUATORS + 4 * i, j, h, y[n], k[0, n], k[last, n], increment[n]
-            )
-    history.real[j, HELD_U], history.real[j, HELD_U + 1] = mode.held0, mode.held1
-    history.whole[j, CONTACT], history.whole[j, TORSION], history.whole[j, AXIAL] = (
-        mode.contact,
-        mode.torsion,
-        mode.axial,
-    )
-    history.whole[j, LEVEL] = level
-    history.whole[j, LAG], history.whole[j, FACE], history.whole[j, PASSES] = (
-        mode.lag,
-        mode.face,
-        mode.passes,
-    )
-    history.whole[j, SATURATED] = mode.saturated
+    last, real, whole = STAGES - 1, history.real, history.whole
+    k, new, increment = work.rates, work.vectors[END], work.vectors[INCREMENT]
+    n, m = settings.whole[STATES], settings.whole[INPUTS]
+    real[j, START], real[j, LENGTH] = t, h
+    fit_quintic(real, X, j, h, y[0], y[1], new[1], increment[0], k[0, 1], k[last, 1])
+    fit_quintic(real, THETA, j, h, y[2], y[3], new[3], increment[2], k[0, 3], k[last, 3])
+    for i in range(4, moving(settings)):
+        column = OTHERS + QUARTIC * (i - 4)
+        real[j, column] = y[i]
+        for q in range(QUARTIC - 1):
+            total = 0.0
+            for stage in range(STAGES):
+                total += DENSE[stage, q] * k[stage, i]
+            real[j, column + 1 + q] = h * total
+    held = OTHERS + QUARTIC * (n + m - 4)
+    for i in range(m):
+        real[j, held + i] = y[n + m + i]
+    whole[j, CONTACT], whole[j, TORSION], whole[j, AXIAL] = mode.contact, mode.torsion, mode.axial
+    whole[j, LEVEL], whole[j, LAG], whole[j, FACE] = level, mode.lag, mode.face
+    whole[j, PASSES], whole[j, SATURATED] = mode.passes, mode.saturated
+
+
+@numba.njit(cache=True, error_model="numpy")
+def recall(settings, history, j, s, y):
+    """Write states, actuators and held outputs on step j at s into the vector of `Settings`."""
+    n, m, real = settings.whole[STATES], settings.whole[INPUTS], history.real
+    y[0], y[1], y[2], y[3] = state_at(history, j, s)
+    for i in range(4, moving(settings)):
+        y[i] = quartic(real, OTHERS + QUARTIC * (i - 4), j, s)
+    held = OTHERS + QUARTIC * (n + m - 4)
+    for i in range(m):
+        y[n + m + i] = real[j, held + i]

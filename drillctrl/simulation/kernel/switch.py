@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numba
-import numpy as np
 
 from .data import (
     AT_LIMIT,
     AXIAL_RATE,
+    BARRIER,
+    BEGIN,
     DEPTH,
     DOWN,
     FEEDBACK,
@@ -15,7 +16,7 @@ from .data import (
     HELD,
     HELD_TO_DOWN,
     HELD_TO_UP,
-    KINDS,
+    INPUTS,
     LINEAR,
     P_DEPTH,
     P_DOWN,
@@ -23,10 +24,11 @@ from .data import (
     P_REVERSE,
     P_ROOM,
     P_UP,
-    PROBES,
     RELEASE_FORWARD,
     RELEASE_REVERSE,
     REVERSE,
+    SCALE,
+    STAGES,
     STUCK,
     TORSION_RATE,
     UP,
@@ -54,15 +56,13 @@ def with_branch(mode, contact, torsion, axial):
         mode.piece,
         mode.gains,
         mode.on,
-        mode.held0,
-        mode.held1,
     )
 
 
 @numba.njit(cache=True, error_model="numpy")
-def snap(kind, y, p):
+def snap(kind, y, q):
     """Make a velocity that has just been found to vanish vanish exactly."""
-    zero = rates((0.0, 0.0, 0.0, 0.0), p)
+    zero = rates((0.0, 0.0, 0.0, 0.0), q)
     if kind == AXIAL_RATE:
         y[1] = -zero[0]
     elif kind == TORSION_RATE:
@@ -70,41 +70,43 @@ def snap(kind, y, p):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def next_saturation(settings, history, steps, mode, kind, t, y):
+def next_saturation(settings, history, steps, mode, kind, t, y, work):
     """Which limits hold the inputs after an event or a jump, as bits; see `Mode`."""
-    if AT_LIMIT <= kind < KINDS:
+    if kind >= AT_LIMIT:
         return mode.saturated ^ (1 << (kind - AT_LIMIT))
-    if settings.flags[FEEDBACK] == 0:
+    if settings.whole[FEEDBACK] == 0:
         return 0
-    out, probe = np.empty(6), np.zeros(PROBES)
-    rate_of_change(settings, history, steps, mode, t, y, out, probe)
+    rate_of_change(settings, history, steps, mode, t, y, work.rates[STAGES], work.stages[STAGES])
     saturated = 0
-    for limit in range(AT_LIMIT, KINDS):
-        if watched(settings, limit, mode) and probe[P_ROOM + limit - AT_LIMIT] < 0.0:
-            saturated |= 1 << (limit - AT_LIMIT)
+    for limit in range(2 * settings.whole[INPUTS]):
+        if watched(settings, AT_LIMIT + limit, mode) and work.stages[STAGES, P_ROOM + limit] < 0.0:
+            saturated |= 1 << limit
     return saturated
 
 
 @numba.njit(cache=True, error_model="numpy")
-def next_mode(settings, history, steps, mode, kind, t, y):
+def next_mode(settings, history, steps, mode, kind, t, y, work):
     """Return contact, torsion and axial branch after an event, or at the start.
 
     At Φ' = 0 the bit stays if the torque offered lies between what full friction (and
     cutting) can bear in either direction, else it goes where it is pushed. Z' = 0 likewise,
     with a wear-flat force anywhere in [0, λ].
     """
-    if settings.flags[LINEAR] == 1:
+    if settings.whole[LINEAR] == 1:
         return 1, FORWARD, DOWN
-    out, probe = np.empty(6), np.zeros(PROBES)
-    axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.p)
-    push, turn = 1e-13 * settings.scale[HELD_TO_UP], 1e-13 * settings.scale[RELEASE_FORWARD]
+    out, probe = work.rates[STAGES], work.stages[STAGES]
+    axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.q)
+    push, turn = (
+        1e-13 * settings.real[SCALE + HELD_TO_UP],
+        1e-13 * settings.real[SCALE + RELEASE_FORWARD],
+    )
     contact, torsion, axial = mode.contact, mode.torsion, mode.axial
     at_rest = torsion == STUCK or kind == TORSION_RATE or rotary_rate == 0.0
     if kind == DEPTH:
         contact = 1 - contact
-    elif kind >= KINDS:
+    elif kind in (BARRIER, BEGIN):
         rate_of_change(settings, history, steps, mode, t, y, out, probe)
-        tolerance = 1e-11 * settings.scale[DEPTH]
+        tolerance = 1e-11 * settings.real[SCALE + DEPTH]
         if probe[P_DEPTH] < -tolerance:
             contact = 0
         elif probe[P_DEPTH] > tolerance:

@@ -1,0 +1,112 @@
+"""A plant as the integrator takes it: arrays of the string, and source of the law of its bit."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.bit_rock import BitRock, steady_delay, steady_depth
+from drillctrl.drilling.case import Case
+from drillctrl.drilling.coefficients import Coefficients
+from drillctrl.drilling.motion import MotionArrays, law_functions, rest_state
+from drillctrl.simulation.translate import translate_module
+
+DECORATOR = "@numba.njit(cache=True, error_model='numpy')"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A linear string whose bit meets the rock: X' = A X + E (load − steady) + B u + T top.
+
+    Attributes
+    ----------
+    state_names, input_names, output_names : tuple of str
+        Of X, which begins with x, x', θ, θ' of the bit; of u; and of C X − R top.
+    arrays : MotionArrays
+        Of the string and of its linear motion, and the parameters of the law.
+    physics : str
+        Source of the module of the bit's kinematics and its law, which is compiled.
+    """
+
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    arrays: MotionArrays
+    physics: str
+
+    @property
+    def _c(self) -> Coefficients:
+        return Coefficients(*self.arrays.q[: len(Coefficients._fields)].tolist())
+
+    @property
+    def omega0(self) -> float:
+        """Ω0."""
+        return float(self._c.rotary_speed)
+
+    @property
+    def penetration_rate(self) -> float:
+        """V0."""
+        return float(self._c.penetration_rate)
+
+    @property
+    def delay(self) -> float:
+        """τ0 (Eq. 18)."""
+        return float(steady_delay(self._c))
+
+    @property
+    def steady_depth(self) -> float:
+        """Depth of cut in steady drilling (Eq. 11)."""
+        return float(steady_depth(self._c))
+
+    def is_same(self, other: Structure) -> bool:
+        """Whether another string and law move alike."""
+        names = ("q", "A", "E", "B", "T")
+        return self.physics == other.physics and all(
+            np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name))
+            for name in names
+        )
+
+    @functools.cached_property
+    def rest(self) -> FloatArray:
+        """State of a bit at rest without load, the top end at V0 t = Ω0 t = 0, (n,)."""
+        return rest_state(self.arrays)
+
+
+@dataclass(frozen=True)
+class _Form:
+    """A key that carries a law of that form."""
+
+    form: Hashable
+    law: BitRock = field(compare=False)
+
+
+@functools.lru_cache(maxsize=64)
+def _physics(key: _Form) -> str:
+    return translate_module(law_functions(key.law), DECORATOR)
+
+
+def structure_of(case: Case) -> Structure:
+    """Return what the integrator takes of a case.
+
+    Raises
+    ------
+    InputError
+        If there is no plant, or a signal of it arrives late.
+    """
+    plant, _ = case.physics("a simulation")
+    arrays = case.motion()
+    if arrays.late:
+        delay = f"a signal that arrives {arrays.late[0][0]:g} late"
+        raise InputError("plant", delay, "one without; give the controller the delay")
+    return Structure(
+        plant.state_names,
+        plant.input_names,
+        plant.output_names,
+        arrays,
+        _physics(_Form(plant.bit.form, plant.bit)),
+    )
