@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,8 @@ from drillctrl.drilling.case import Case, Where, as_case
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from drillctrl.base.workers import Progress
+
 
 # What a mesh is written as, by the file's ending.
 MESH_FORMATS: dict[str, dict[str, Any]] = {
@@ -34,7 +36,6 @@ MESH_FORMATS: dict[str, dict[str, Any]] = {
     ".stl": {"file_format": "stl", "binary": True},
 }
 _EDGE = 1e-6
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +11,11 @@ from drillctrl.base.errors import InputError
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.progress import open_progress
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
-    from drillctrl.studies.compare import Given, Progress
+    from drillctrl.studies.compare import Given
     from drillctrl.studies.comparison import Comparison
 
 ENDINGS = (".html", ".csv", ".json")
@@ -69,7 +67,7 @@ def compare_command(
     from drillctrl.cli.scenario import read_numbers
     from drillctrl.studies.compare import REGION, compare
 
-    with _progress() as progress:
+    with open_progress() as progress:
         result = compare(
             where,
             [name for name in names if name],
@@ -120,19 +118,3 @@ def _write(result: Comparison, out: str) -> None:
     else:
         text = json_text(result.to_dict()) + "\n"
     writing("--out", out, lambda: write_text(out, text))
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Progress | None]:
-    """Yield what says on a terminal what is being done."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-
-    def show(what: str, done: int, total: int) -> None:
-        click.echo(f"\r\x1b[K{done}/{total} {what}", nl=False, err=True)
-
-    try:
-        yield show
-    finally:
-        click.echo("\r\x1b[K", nl=False, err=True)

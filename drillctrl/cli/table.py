@@ -14,7 +14,7 @@ from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
-from drillctrl.cli.parallel import open_executor, open_progress
+from drillctrl.cli.progress import open_progress
 from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
@@ -135,6 +135,7 @@ def _design(
 ) -> tuple[GainTable, Checkpoint | None]:
     """Return the table that the options ask for, and where its designs are kept."""
     from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.base.workers import open_executor
     from drillctrl.drilling.structures import preset_structure
     from drillctrl.synthesis.objectives import Exact
     from drillctrl.tables.table import table

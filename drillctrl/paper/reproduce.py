@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import save_figure
@@ -15,7 +16,8 @@ from drillctrl.paper.campaign import campaign
 from drillctrl.paper.equations import equations
 from drillctrl.paper.panels import Reproduced
 
-Progress = Callable[[str, int, int], None]
+if TYPE_CHECKING:
+    from drillctrl.base.workers import Progress
 
 PARTS: dict[str, Callable[[], Reproduced]] = {
     "equations": equations,

@@ -21,10 +21,10 @@ from drillctrl.studies.comparison_text import delay_room
 from drillctrl.studies.measures import basin, respond
 
 if TYPE_CHECKING:
+    from drillctrl.base.workers import Progress
     from drillctrl.charts.chart import StabilityChart
 
 Given = tuple[str, str | FeedbackStructure, npt.ArrayLike, npt.ArrayLike | None]
-Progress = Callable[[str, int, int], None]
 
 DISTURBANCE = {"dx": 1.0, "dtheta": 1.0}
 REGION = (("omega0", 0.5, 25.0), ("delta0", 0.0, 15.0))

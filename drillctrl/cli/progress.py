@@ -1,0 +1,35 @@
+"""How far the work has come."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from drillctrl.base.workers import Progress
+
+
+@contextlib.contextmanager
+def open_progress() -> Iterator[Progress | None]:
+    """Yield what says on a terminal what is being done; nothing is said into a file."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    since: dict[str, float] = {}
+
+    def show(stage: str, done: int, total: int) -> None:
+        now = time.monotonic()
+        spent = now - since.setdefault(stage, now)
+        # The first was done before the clock ran.
+        left = f", {spent / (done - 1) * (total - done):.0f} s left" if spent > 1.0 else ""
+        click.echo(f"\r\x1b[K{done}/{total} {stage}{left}", nl=False, err=True)
+
+    try:
+        yield show
+    finally:
+        click.echo("\r\x1b[K", nl=False, err=True)
