@@ -338,3 +338,27 @@ def test_bad_objectives_are_refused_in_one_line(capsys, options, named):
     assert (status, out) == (2, "")
     assert named in err
     assert err.count("\n") == 1
+
+
+NODES = ("--omega0", "9:11:2", "--delta0", 1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "package", "extra"),
+    [
+        (("chart", "--plot", "chart.png"), "matplotlib", "figures"),
+        (("compare", "--out", "report.html"), "matplotlib", "figures"),
+        (("analyze", "--prove"), "flint", "proof"),
+        (("table", *NODES, "--out", "t.parquet"), "pyarrow", "tables"),
+        (("table", *NODES, "--out", "t.nc"), "xarray", "tables"),
+        (("table", *NODES, "--scheduler", "tcp://h:1"), "distributed", "cluster"),
+    ],
+)
+def test_a_missing_extra_is_one_line(capsys, tmp_path, monkeypatch, arguments, package, extra):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, package, None)
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    wanted = f"{package} = missing: must be installed: pip install 'drillctrl[{extra}]'"
+    assert err == f"drillctrl: {wanted}\n"
+    assert list(tmp_path.iterdir()) == []

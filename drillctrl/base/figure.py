@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 
 if TYPE_CHECKING:
@@ -18,14 +19,26 @@ BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 FIGURE_ENDINGS = (".pdf", ".png", ".svg")
 
 
-def new_axes(width: float = 6.4, height: float = 4.2) -> Axes:
-    """Return Axes in a new figure that belongs to no window."""
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure that belongs to no window.
+
+    Raises
+    ------
+    InputError
+        If matplotlib is not installed.
+    """
+    required("matplotlib", "figures")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    return figure.add_subplot()
+    return figure
+
+
+def new_axes(width: float = 6.4, height: float = 4.2) -> Axes:
+    """Return Axes in a new figure that belongs to no window."""
+    return new_figure(width, height).add_subplot()
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
@@ -47,6 +60,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
 
 def check_figure_path(path: str | Path) -> None:
-    """Raise `InputError` if a figure cannot be written under this name."""
+    """Raise `InputError` if a figure cannot be written under this name, or not drawn."""
+    required("matplotlib", "figures")
     if Path(path).suffix.lower() not in FIGURE_ENDINGS:
         raise InputError("plot", str(path), f"a file that ends in {', '.join(FIGURE_ENDINGS)}")

@@ -13,11 +13,12 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -115,12 +116,7 @@ def _follow_parent() -> None:
 
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    try:
-        import distributed
-    except ImportError:
-        raise InputError(
-            "scheduler", address, "used with Dask: pip install 'drillctrl[cluster]'"
-        ) from None
+    distributed = required("distributed", "cluster")
     # What it logs on the way is what is raised in the end.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -130,8 +126,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
         # A client given what is no address tries to close what it has not opened.
         get_address_host_port(address)
-        make: Any = distributed.Client
-        client = make(address, timeout="10s", set_as_default=False)
+        client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError("scheduler", address, f"a scheduler that answers ({error})") from None
     executor = client.get_executor(pure=False)

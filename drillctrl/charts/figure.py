@@ -186,9 +186,9 @@ def plot_chart(
     ax : Axes, optional
         By default new ones.
     """
+    ax = new_axes() if ax is None else ax
     from matplotlib.collections import LineCollection
 
-    ax = new_axes() if ax is None else ax
     word = "stable" if level == 0.0 else f"all roots left of {level:g}"
     draw_strips(ax, stable_strips(lines, rows=rows), BLUE, word)
     pieces, speeds = [], []

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chains import stable_curves
@@ -130,12 +131,7 @@ class StabilityVolume:
         ending = Path(path).suffix.lower()
         if ending not in MESH_FORMATS:
             raise InputError("out", str(path), f"a file that ends in {', '.join(MESH_FORMATS)}")
-        try:
-            import meshio
-        except ImportError:
-            raise InputError(
-                "out", str(path), "written with meshio: pip install 'drillctrl[volumes]'"
-            ) from None
+        meshio = required("meshio", "volumes")
         corners, quads = self.surface()
         # Triangles, which every one of these formats knows.
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

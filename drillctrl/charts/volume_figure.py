@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctrl.base.figure import new_axes
+from drillctrl.base.figure import new_axes, new_figure
 from drillctrl.charts.figure import axis_text, draw_curves, label_axes
 
 if TYPE_CHECKING:
@@ -42,14 +42,10 @@ def plot_volume(
     ax : Axes3D, optional
         With ``projection="3d"``; by default new ones.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    if ax is None:
+        ax = new_figure(6.8, 5.2).add_subplot(projection="3d")
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    if ax is None:
-        own = Figure(figsize=(6.8, 5.2), layout="constrained")
-        FigureCanvasAgg(own)
-        ax = own.add_subplot(projection="3d")
     # x and z span the floor, y is the height: the stable depth of cut in Fig. 5.
     faces = corners[quads][:, :, [0, 2, 1]]
     height = faces[:, :, 2].mean(axis=1)

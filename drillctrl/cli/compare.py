@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
@@ -62,6 +63,8 @@ def compare_command(
     check_folder("--out", out)
     if out is not None and Path(out).suffix.lower() not in ENDINGS:
         raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
+    if out is not None and Path(out).suffix.lower() == ".html":
+        required("matplotlib", "figures")
     where, names = read_point(point), [name.strip() for name in structures.split(",")]
     candidates = [read_given(text) for text in given]
     from drillctrl.cli.scenario import read_numbers

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.extras import required
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 
@@ -55,7 +56,7 @@ def controller_system(
         Inputs are the outputs of the plant, outputs are its inputs; the states are the past
         samples of each output, latest first.
     """
-    import control
+    control = required("control", "control")
 
     now, past = gain_matrices(structure, K1, K2)
     step = checked_number("period", period, 0.0, open_low=True)
@@ -116,7 +117,7 @@ def scheduled_controller(
     control.NonlinearIOSystem
         Inputs are the plant's outputs, then ``omega0``, ``delta0``, ``psi``.
     """
-    import control
+    control = required("control", "control")
 
     lowest = checked_number("slowest", slowest, 0.0, open_low=True)
     step = checked_number("period", period, 0.0, open_low=True)

@@ -10,6 +10,7 @@ import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.extras import required
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum.characteristic import magnitude_bound
@@ -38,7 +39,7 @@ def lifted_system(system: DelaySystem, m: int | None = None, order: int = 1) -> 
         outputs are those of the system. The input is held over a step. States are those of
         the system, then the past samples of the delayed signals, ``w1[-1]`` and so on.
     """
-    import control
+    control = required("control", "control")
 
     scheme = semidiscretize(system, m, order)
     matrix = scheme.matrix()
@@ -108,7 +109,7 @@ def pade_approximation(
     InputError
         If the degree is out of range, or there is nothing to approximate.
     """
-    import control
+    control = required("control", "control")
 
     degree = checked_integer("degree", degree, 1, 20)
     if not system.delays or not system.B.size or not system.C.size:

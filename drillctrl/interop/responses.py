@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.extras import required
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
@@ -30,7 +31,7 @@ def to_frd(
     omega : array_like, optional
         By default `frequency_grid`.
     """
-    import control
+    control = required("control", "control")
 
     grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
     return control.frd(frequency_response(system, grid), grid, smooth=_is_siso(system))
@@ -44,7 +45,7 @@ def loop_frd(
     omega: npt.ArrayLike | None = None,
 ) -> control.FrequencyResponseData:
     """Return `loop_transfer` as python-control data, ready for ``stability_margins``."""
-    import control
+    control = required("control", "control")
 
     grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
     data = loop_transfer(system, structure, K1, K2, grid)

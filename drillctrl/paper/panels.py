@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.figure import new_figure
 from drillctrl.paper.agreement import Agreement
 
 if TYPE_CHECKING:
@@ -33,9 +34,5 @@ class Reproduced:
 
 def panels(rows: int, columns: int) -> tuple[Figure, list[Axes]]:
     """Return a figure that belongs to no window, and its Axes row by row."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6 * columns, 3.9 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(5.6 * columns, 3.9 * rows)
     return figure, list(figure.subplots(rows, columns, squeeze=False).ravel())

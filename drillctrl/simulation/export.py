@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 from drillctrl.base.tableio import csv_text
 from drillctrl.simulation.result import Simulation
@@ -21,12 +22,7 @@ def check_export_path(path: str | Path) -> None:
     if ending not in ENDINGS:
         raise InputError("out", str(path), f"a file that ends in {', '.join(ENDINGS)}")
     if ending == ".parquet":
-        try:
-            import pyarrow  # noqa: F401
-        except ImportError:
-            raise InputError(
-                "out", str(path), "a .csv or .npz file, or pyarrow installed"
-            ) from None
+        required("pyarrow", "tables")
 
 
 def export_motion(simulation: Simulation, path: str | Path) -> None:

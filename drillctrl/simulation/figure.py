@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes, new_figure
 from drillctrl.simulation.rock_face import rock_face
 from drillctrl.simulation.trace import Trace
 
@@ -49,13 +49,9 @@ def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
     inputs : sequence of str
         Those that a controller drives.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = ["x", "bit_speed"]
     names += [name for name in run.input_names if name in inputs]
-    figure = Figure(figsize=(7.2, 1.9 * len(names) + 0.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(7.2, 1.9 * len(names) + 0.8)
     axes = figure.subplots(len(names), 1, sharex=True)
     for ax, name in zip(axes, names, strict=True):
         plot_signal(run, name, ax)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 from drillctrl.drilling.rig import Rig
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.past import Past, past_of
@@ -100,7 +101,7 @@ class Simulation(Trace):
 
     def to_control(self) -> Any:
         """Return the motion as a python-control ``TimeResponseData``."""
-        import control
+        control = required("control", "control")
 
         motion = self.motion
         states, inputs = (

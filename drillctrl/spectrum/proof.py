@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import checked_number
+from drillctrl.base.extras import required
 from drillctrl.delay.system import DelaySystem
 
 PRECISION = 106
@@ -76,12 +77,7 @@ def prove_count(system: DelaySystem, line: float, most: int = _MAX_SEGMENTS) -> 
     quarter, and their principal arguments add up to the true change.
     """
     checked_number("line", line)
-    try:
-        import flint
-    except ImportError:
-        raise InputError(
-            "proof", "python-flint is missing", "installed: pip install 'drillctrl[proof]'"
-        ) from None
+    flint = required("flint", "proof")
     began = time.perf_counter()
     old, flint.ctx.prec = flint.ctx.prec, PRECISION
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_figure
 from drillctrl.tables.figure import axis_label
 from drillctrl.tables.grid import Grid
 
@@ -41,10 +41,6 @@ def plot_campaign(
     Of a third axis the middle value is shown. The line is α = 0 of the linear loop. Parameters
     are the attributes of a `Campaign`.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
     across = 2 - int(np.argmin(grid.shape[::-1]))
     right, up = (axis for axis in range(3) if axis != across)
     middle = grid.shape[across] // 2
@@ -56,8 +52,9 @@ def plot_campaign(
     flat = chosen.ravel()
     measured = bool((np.nan_to_num(basin[flat, 0]) > 0.0).any())
     count = len(sizes) + measured
-    figure = Figure(figsize=(4.3 * count, 4.3), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(4.3 * count, 4.3)
+    from matplotlib.colors import LogNorm
+
     axes = figure.subplots(1, count, squeeze=False, sharex=True, sharey=True)[0]
     alpha = spectral_abscissa[chosen]
     for k, size in enumerate(sizes):

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.figure import new_figure
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.tables.grid import Axis, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, BoolArray, Cells, cell_shape
@@ -71,14 +72,10 @@ def plot_table(table: Drawn) -> Figure:
     nothing stabilises are crosses; cells that did not pass are hatched, those with constant
     gains dotted.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     panels = _panels(table)
     columns = min(3, len(panels))
     rows = math.ceil(len(panels) / columns)
-    figure = Figure(figsize=(max(4.0 * columns, 6.5), 3.3 * rows + 0.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(max(4.0 * columns, 6.5), 3.3 * rows + 0.4)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     held = [axis.text(*axis.values) for axis in table.grid.axes if len(axis.values) == 1]
     for ax, (title, draw) in zip(axes, panels, strict=False):

@@ -13,6 +13,7 @@ from typing import IO, Any
 import numpy as np
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 from drillctrl.base.tableio import csv_text
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
@@ -83,10 +84,7 @@ def check_table_path(path: str | Path) -> None:
         raise InputError("table", str(path), f"a file that ends in {', '.join(_FORMATS)}")
     needs = {".parquet": "pyarrow", ".nc": "xarray"}.get(ending)
     if needs is not None:
-        from importlib.util import find_spec
-
-        if find_spec(needs) is None:
-            raise InputError("table", str(path), f"a .csv or .json file, or {needs} installed")
+        required(needs, "tables")
 
 
 def _write_csv(document: Document, file: IO[bytes]) -> None:
