@@ -19,6 +19,7 @@ from drillctrl.simulation.structure import Structure, structure_of
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
 LONGEST = 1e6
+TRIES = 400_000
 
 
 def checked_run(
@@ -91,6 +92,7 @@ def simulate(
     atol: float | None = None,
     max_step: float = math.inf,
     max_steps: int = 1_000_000,
+    time_limit: float = math.inf,
 ) -> Simulation:
     """Simulate the drill string with state-dependent delay, dry friction and loss of contact.
 
@@ -119,6 +121,9 @@ def simulate(
         Longest step.
     max_steps : int
         The run stops there with status ``"step limit"``.
+    time_limit : float
+        Seconds of wall time after which it stops with status ``"time limit"``; looked at
+        several times a second.
 
     Returns
     -------
@@ -137,6 +142,8 @@ def simulate(
     cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
     over what it had cut already.
     """
+    if isinstance(time_limit, bool) or not time_limit > 0.0:
+        raise InputError("time_limit", time_limit, "positive")
     case = as_case(where)
     _, point = case.physics("a simulation")
     structure = structure_of(case)
@@ -173,11 +180,18 @@ def simulate(
         data.REVERSED: "reverse rotation",
         data.TOO_DEEP: "face too old",
         data.NOT_FINITE: "not finite",
+        data.PAUSED: "time limit",
     }
     started = time.perf_counter()
+    # Few enough that an interrupt is heard soon.
+    tries = TRIES // (len(structure.state_names) + 16)
     while True:
-        outcome = march.march(*standing[:-1], duration, float(max_step))
+        outcome = march.march(*standing[:-1], duration, float(max_step), tries)
         used = int(standing.ints[march.STEPS])
+        if outcome == data.PAUSED:
+            if time.perf_counter() - started <= time_limit:
+                continue
+            break
         if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
             break
         room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)

@@ -92,7 +92,7 @@ class Trace:
         As asked for; ``times[-1]`` is what was reached.
     status : str
         ``"done"``, or why it went no further: ``"step collapse"``, ``"reverse rotation"``,
-        ``"step limit"``, ``"face too old"``, ``"not finite"``.
+        ``"step limit"``, ``"time limit"``, ``"face too old"``, ``"not finite"``.
     elapsed_seconds : float
         Wall time of the integration.
     structure : Structure

@@ -38,10 +38,13 @@ from .data import (
 from .interpolate import state_at
 from .model import rate_of_change
 from .physics import rates
-from .step import recall
+from .step import attempt, recall, record
 
 SAMPLES = 10
 NONE = 2.0
+TANGENTS, REPEATS = 6, 60
+# Steps are at least this long, relative to the time.
+SHORTEST = 1e-14
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -183,3 +186,44 @@ def first_zero(settings, history, steps, mode, kind, work):
                 return 0.0 if s < 1e-6 else s
         return 0.0
     return NONE
+
+
+@numba.njit(cache=True, error_model="numpy")
+def refine(settings, history, steps, mode, kind, t, s, y, work, level):
+    """Repeat the step so that it ends where an event function vanishes; return its length.
+
+    The function is positive at the start of the step, and negative at s or soon after. Its
+    zero stays in a bracket, since depth falls like a root where the bit behind had come to
+    rest, and a tangent points anywhere.
+
+    Returns
+    -------
+    float
+        Length; negative, that of the whole step, if repeated steps find no zero.
+    """
+    whole_step = history.real[steps, LENGTH]
+    low, high, h, crossed = 0.0, whole_step, s * whole_step, False
+    least = SHORTEST * max(1.0, abs(t))
+    for i in range(REPEATS):
+        attempt(settings, history, steps, mode, t, h, y, work)
+        record(settings, history, steps, mode, t, h, y, work, level)
+        value = value_on_step(settings, history, steps, mode, kind, 1.0, work)
+        if abs(value) <= 1e-11 * settings.real[SCALE + kind]:
+            return h
+        if value > 0.0:
+            low = h
+            if h == whole_step:
+                return -whole_step
+        else:
+            high, crossed = h, True
+        if high - low <= least:
+            break
+        before = value_on_step(settings, history, steps, mode, kind, 0.98, work)
+        guess = h - 0.02 * h * value / (value - before) if value != before else low
+        # Tangents that do not get there give way to halving.
+        if not low < guess < high or i >= TANGENTS:
+            guess = 0.5 * (low + high) if crossed else whole_step
+        h = guess
+    attempt(settings, history, steps, mode, t, high, y, work)
+    record(settings, history, steps, mode, t, high, y, work, level)
+    return high

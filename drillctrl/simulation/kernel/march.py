@@ -24,7 +24,6 @@ from .data import (
     END,
     FEEDBACK,
     INPUTS,
-    LENGTH,
     LEVEL,
     LINEAR,
     MAX_FACE_LEVELS,
@@ -32,10 +31,10 @@ from .data import (
     NO_BREAK,
     NOT_FINITE,
     P_ROOM,
+    PAUSED,
     RATE_FEEDBACK,
     REVERSE,
     REVERSED,
-    SCALE,
     STAGES,
     START,
     STATES,
@@ -45,7 +44,7 @@ from .data import (
     Mode,
     Work,
 )
-from .events import NONE, first_zero, value_on_step, watched
+from .events import NONE, SHORTEST, first_zero, refine, watched
 from .interpolate import locate_time, step_at
 from .model import lag_of, rate_of_change
 from .physics import rates
@@ -57,7 +56,8 @@ from .switch import next_mode, next_saturation, snap
  REJECTED, EVALUATIONS, I_SATURATED, LAG0) = range(15)  # fmt: skip
 TIME, STEP, NEXT_SAMPLE = range(3)
 REFINE = 6
-SHORTEST = 1e-14
+# A break that is nearer than this, relative to the angle turned, is met.
+PASSED = 5e-14
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -156,28 +156,27 @@ def seek_past(settings, history, steps, ints, following, t):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def refine(settings, history, steps, mode, kind, t, s, y, work, level):
-    """Repeat the step so that it ends where an event function vanishes; return its length."""
-    h = s * history.real[steps, LENGTH]
-    for _ in range(REFINE):
-        attempt(settings, history, steps, mode, t, h, y, work)
-        record(settings, history, steps, mode, t, h, y, work, level)
-        value = value_on_step(settings, history, steps, mode, kind, 1.0, work)
-        if abs(value) <= 1e-11 * settings.real[SCALE + kind]:
-            break
-        before = value_on_step(settings, history, steps, mode, kind, 0.98, work)
-        slope = (value - before) / (0.02 * h)
-        change = -value / slope
-        if not abs(change) < 0.1 * h:
-            break
-        h += change
-    attempt(settings, history, steps, mode, t, h, y, work)
-    record(settings, history, steps, mode, t, h, y, work, level)
-    return h
+def pass_angle_break(settings, history, steps, ints, chain, following, which, t, theta):
+    """Move the lag in angle over the break that it has met; return the level this brings."""
+    b, whole = following[which], settings.whole
+    gain = 1 if whole[RATE_FEEDBACK] + whole[CURRENT_DELAY] == 2 else 2
+    level = passed_on(history.whole[b, LEVEL], history.whole[b, TORSION] == STUCK, gain)
+    chain[which] = b
+    tolerance = 2.0 * PASSED * turned_by(settings, t, theta)
+    ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, theta, tolerance)
+    if ints[I_PASSES] <= MAX_FACE_LEVELS:
+        follow(settings, history, steps, mode_of(ints, chain), chain, t, theta)
+    return level
 
 
 @numba.njit(cache=True, error_model="numpy")
-def march(settings, history, ints, reals, y, chain, following, end, max_step):
+def turned_by(settings, t, theta):
+    """Size of the angles that a difference of angles is formed of."""
+    return 1.0 + abs(theta) + rates((0.0, 0.0, 0.0, 0.0), settings.q)[1] * abs(t)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def march(settings, history, ints, reals, y, chain, following, end, max_step, tries):
     """Integrate until ``end`` or until the history is full.
 
     Parameters
@@ -190,11 +189,13 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         Vector of `Settings` now; changed in place.
     end, max_step : float
         Time to stop at, and longest step.
+    tries : int
+        Steps tried before it pauses.
 
     Returns
     -------
     int
-        Why it stopped: DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
+        Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
     """
     q, size = settings.q, moving(settings)
     linear = settings.whole[LINEAR] == 1
@@ -205,9 +206,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
     work = workplace(settings)
     k, stages, new = work.rates, work.stages, work.vectors[END]
     probes = stages.shape[1] - 2
-    zero_rates = rates((0.0, 0.0, 0.0, 0.0), q)
     known = False  # whether the rates at the start of the step are
-    while True:
+    for _ in range(tries):
         t, steps = reals[TIME], ints[STEPS]
         if t >= end:
             return DONE
@@ -227,6 +227,19 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         near, front = np.inf, np.inf
         if not linear:
             near, front = angle_limits(history, q, steps, mode, chain, following, t, y, k[0, 3])
+            left, which = least_angle_left(history, q, steps, mode, following, t, y[2])
+            if which >= 0 and left <= PASSED * turned_by(settings, t, y[2]):
+                # No step fits in between.
+                level = pass_angle_break(
+                    settings, history, steps, ints, chain, following, which, t, y[2]
+                )
+                if ints[I_PASSES] > MAX_FACE_LEVELS:
+                    return TOO_DEEP
+                if level <= 2:
+                    enter(settings, history, steps, ints, chain, BARRIER, t, y, work)
+                ints[I_LEVEL] = min(ints[I_LEVEL], level)
+                known = False
+                continue
         h = min(reals[STEP], longest, front, max_step)
         aim = near <= 1.02 * h
         if aim:
@@ -253,14 +266,15 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 return COLLAPSE
             continue
         record(settings, history, steps, mode, t, h, y, work, level)
-        wanted = h * min(5.0, 0.9 * max(error, 1e-8) ** -0.2)
-        if not (aim or at_goal) or wanted < reals[STEP]:
-            reals[STEP] = wanted
+        growth = min(5.0, 0.9 * max(error, 1e-8) ** -0.2)
+        # A step that was cut short and was easy says nothing of the next.
+        if not (aim or at_goal) or (growth < 5.0 and growth * h < reals[STEP]):
+            reals[STEP] = growth * h
 
         # End at the break that the lag in angle has met.
         reached = -1
         if not linear and mode.torsion != STUCK:
-            turns = 1.0 + abs(new[2]) + zero_rates[1] * abs(t)
+            turns = turned_by(settings, t, new[2])
             for _ in range(REFINE):
                 left, which = least_angle_left(history, q, steps, mode, following, t + h, new[2])
                 if abs(left) <= 4e-15 * turns:
@@ -305,6 +319,10 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
                 continue
             if where < 1.0:
                 h = refine(settings, history, steps, mode, kind, t, where, y, work, level)
+                if h < 0.0:
+                    reals[STEP] = -0.5 * h
+                    ints[REJECTED] += 1
+                    continue
                 reached, at_goal = -1, False
         ints[STALLS] = 0
 
@@ -318,16 +336,14 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
         if not linear:
             follow(settings, history, steps, mode, chain, t, y[2])
         if reached >= 0:
-            b = following[reached]
-            gain = 1 if settings.whole[RATE_FEEDBACK] + settings.whole[CURRENT_DELAY] == 2 else 2
-            stuck = history.whole[b, TORSION] == STUCK
-            level = min(level, passed_on(history.whole[b, LEVEL], stuck, gain))
-            chain[reached] = b
-            tolerance = 1e-13 * (1.0 + abs(y[2]) + zero_rates[1] * t)
-            ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, y[2], tolerance)
+            level = min(
+                level,
+                pass_angle_break(
+                    settings, history, steps, ints, chain, following, reached, t, y[2]
+                ),
+            )
             if ints[I_PASSES] > MAX_FACE_LEVELS:
                 return TOO_DEEP
-            follow(settings, history, steps, mode_of(ints, chain), chain, t, y[2])
         gains = ints[GAINS]
         if take_sample(settings, history, steps, ints, reals, t, y):
             level = 2
@@ -347,3 +363,4 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step):
             cause = kind if kind >= 0 else BARRIER
             enter(settings, history, steps, ints, chain, cause, t, y, work)
         ints[I_LEVEL] = level
+    return PAUSED
