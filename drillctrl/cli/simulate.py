@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +56,7 @@ FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
     help="Of drive or rock: 't=50,omega0=9', 't=50,psi=18,duration=10'; may be repeated.",
 )
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative error.")
+@click.option("--time-limit", type=float, metavar="SECONDS", help="Stop the run after these.")
 @click.option("--floquet", is_flag=True, help="Floquet multipliers of the orbit at the end.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Motion: FILE.csv, .npz or .parquet.")
@@ -73,6 +75,7 @@ def simulate_command(
     initial: str | None,
     change: tuple[str, ...],
     rtol: float,
+    time_limit: float | None,
     floquet: bool,
     as_json: bool,
     out: str | None,
@@ -127,7 +130,8 @@ def simulate_command(
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
 
     def again(model: str) -> Simulation:
-        return simulate(where, controller, **common, model=model)
+        stop = math.inf if time_limit is None else time_limit
+        return simulate(where, controller, **common, model=model, time_limit=stop)
 
     run = again(model)
     multipliers = None

@@ -142,8 +142,8 @@ def simulate(
     cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
     over what it had cut already.
     """
-    if isinstance(time_limit, bool) or not time_limit > 0.0:
-        raise InputError("time_limit", time_limit, "positive")
+    if time_limit != math.inf:
+        checked_number("time_limit", time_limit, 0.0, open_low=True)
     case = as_case(where)
     _, point = case.physics("a simulation")
     structure = structure_of(case)
