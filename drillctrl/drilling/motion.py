@@ -22,6 +22,8 @@ from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.linear import BIT_STATES, linear_depth, linearisation
 from drillctrl.drilling.plant import Plant, by_form, expressions
 
+BIT_COEFFICIENTS = ("rotary_speed", "penetration_rate", "blades")
+
 
 def _record(law: BitRock) -> tuple[ca.SX, Coefficients, Any]:
     """Return a vector of symbols, and the coefficients and the law's parameters in it."""
@@ -43,23 +45,24 @@ def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
     load : Function
         (contact, rates, q) → weight and torque on bit; see `Contact` and `Rates`.
     depth, turned : Function
-        (X, Xd, τ, q) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8). X and Xd
-        are the bit's four states.
+        (X, Xd, τ, bit) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8). X and Xd
+        are the bit's four states; bit is Ω0, V0 and n.
     rates : Function
-        (X, q) → Z', Φ'.
+        (X, bit) → Z', Φ'.
     """
     q, c, own = _record(law)
     now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
     delay = ca.SX.sym("delay")
     contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
     bit = kinematics(c, ca.vertsplit(now), ca.vertsplit(then), delay)
+    drives = ca.vertcat(*[getattr(c, name) for name in BIT_COEFFICIENTS])
     load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
-    arguments = [now, then, delay, q]
+    arguments = [now, then, delay, drives]
     return (
         ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)]),
         ca.Function("depth", arguments, [bit.depth]),
         ca.Function("turned", arguments, [bit.turned - pitch(c)]),
-        ca.Function("rates", [now, q], [ca.vertcat(*bit.rates)]),
+        ca.Function("rates", [now, drives], [ca.vertcat(*bit.rates)]),
     )
 
 

@@ -95,7 +95,8 @@ def settings_for(
     index, value = _rows(structure, linear)
     whole[data.FED] = data.ROWS + index.size
     return data.Settings(
-        q=tuple(arrays.q.tolist()),
+        bit=structure.bit,
+        q=np.ascontiguousarray(arrays.q),
         whole=np.concatenate([whole, index, fed]),
         real=real,
         value=value,

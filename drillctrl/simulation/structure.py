@@ -13,7 +13,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.drilling.bit_rock import BitRock, steady_delay, steady_depth
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.coefficients import Coefficients
-from drillctrl.drilling.motion import MotionArrays, law_functions, rest_state
+from drillctrl.drilling.motion import BIT_COEFFICIENTS, MotionArrays, law_functions, rest_state
 from drillctrl.simulation.translate import translate_module
 
 DECORATOR = "@numba.njit(cache=True, error_model='numpy')"
@@ -42,6 +42,11 @@ class Structure:
     @property
     def _c(self) -> Coefficients:
         return Coefficients(*self.arrays.q[: len(Coefficients._fields)].tolist())
+
+    @property
+    def bit(self) -> tuple[float, ...]:
+        """Ω0, V0 and n."""
+        return tuple(getattr(self._c, name) for name in BIT_COEFFICIENTS)
 
     @property
     def omega0(self) -> float:

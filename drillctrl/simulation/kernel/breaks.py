@@ -7,7 +7,6 @@ smooth within each step and the method keeps its order.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .data import (
@@ -19,10 +18,11 @@ from .data import (
     STUCK,
 )
 from .interpolate import beyond, locate_angle, pitch_of, step_before_angle
+from .jit import entry, inner
 from .physics import rates
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def advance(history, steps, following, k, at):
     """Move ``following[k]`` to the first break after step ``at``; ``steps`` if none."""
     b = max(following[k], at + 1)
@@ -32,13 +32,13 @@ def advance(history, steps, following, k, at):
     return b
 
 
-@numba.njit(cache=True, error_model="numpy")
-def angle_left(history, q, b, k, t, theta):
+@inner
+def angle_left(history, bit, b, k, t, theta):
     """Angle the bit has yet to turn until the lag of k + 1 pitches reaches break b."""
-    return -beyond(history, q, b, 0.0, t, theta, k * pitch_of(q))
+    return -beyond(history, bit, b, 0.0, t, theta, k * pitch_of(bit))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def time_to_turn(angle, rate, acceleration):
     """Time in which the bit turns by an angle at constant acceleration; infinite if never."""
     if angle <= 0.0:
@@ -50,23 +50,23 @@ def time_to_turn(angle, rate, acceleration):
     return 2.0 * angle / denominator if denominator > 0.0 else np.inf
 
 
-@numba.njit(cache=True, error_model="numpy")
-def angle_limits(history, q, steps, mode, chain, following, t, y, acceleration):
+@inner
+def angle_limits(history, bit, steps, mode, chain, following, t, y, acceleration):
     """Return the time to the nearest break seen through the angle, and to the last step."""
     if mode.torsion == STUCK:
         return np.inf, np.inf
-    rate = rates((0.0, 0.0, 0.0, y[3]), q)[1]
+    rate = rates((0.0, 0.0, 0.0, y[3]), bit)[1]
     nearest = np.inf
     for k in range(mode.passes):
         b = advance(history, steps, following, k, chain[k])
         if b < steps:
-            left = angle_left(history, q, b, k, t, y[2])
+            left = angle_left(history, bit, b, k, t, y[2])
             nearest = min(nearest, time_to_turn(left, rate, acceleration))
-    return nearest, time_to_turn(0.9 * pitch_of(q), rate, acceleration)
+    return nearest, time_to_turn(0.9 * pitch_of(bit), rate, acceleration)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def least_angle_left(history, q, steps, mode, following, t, theta):
+@inner
+def least_angle_left(history, bit, steps, mode, following, t, theta):
     """Least angle left over all lags, and which lag it is (-1: no break ahead)."""
     least, which = np.inf, -1
     if mode.torsion == STUCK:
@@ -74,42 +74,42 @@ def least_angle_left(history, q, steps, mode, following, t, theta):
     for k in range(mode.passes):
         b = following[k]
         if b < steps:
-            left = angle_left(history, q, b, k, t, theta)
+            left = angle_left(history, bit, b, k, t, theta)
             if left < least:
                 least, which = left, k
     return least, which
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def follow(settings, history, steps, mode, chain, t, theta):
     """Move the places of the lagged instants along, within their smooth pieces."""
-    pitch = pitch_of(settings.q)
+    pitch = pitch_of(settings.bit)
     for k in range(mode.passes):
-        j, _ = locate_angle(history, settings.q, steps, chain[k], t, theta, k * pitch)
+        j, _ = locate_angle(history, settings.bit, steps, chain[k], t, theta, k * pitch)
         if j >= 0:
             chain[k] = j
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def retrace(settings, history, steps, chain, following, t, theta, tolerance):
     """Find the lagged instants anew, across breaks; return how many passes back the face is.
 
     With one lag the face is what the blade ahead left, wherever it was. With all passes
     counted, a blade that was off the rock left the face of the pass before.
     """
-    pitch = pitch_of(settings.q)
+    pitch = pitch_of(settings.bit)
     start = chain[0]
     for k in range(MAX_FACE_LEVELS):
         b = following[k] if k == 0 else start
         b = min(max(b, start), steps - 1) if k == 0 else start
-        j = step_before_angle(history, settings.q, b, t, theta, k * pitch, tolerance)
+        j = step_before_angle(history, settings.bit, b, t, theta, k * pitch, tolerance)
         chain[k], following[k], start = j, j + 1, j
         if settings.whole[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
             return k + 1
     return MAX_FACE_LEVELS + 1
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def passed_on(level, stuck, gain):
     """Level of the break that a delayed break makes; the lag jumps over a stuck bit."""
     return 2 if stuck else level + gain

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .data import (
@@ -24,13 +23,14 @@ from .data import (
     T_ON,
 )
 from .interpolate import locate_angle, state_at, step_at
+from .jit import entry, inner
 from .model import add_earlier, piece_at, within
 
 PIECE, GAINS, ON, SAMPLE = 6, 7, 8, 9
 NEXT_SAMPLE = 2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def next_clock(settings, ints, reals, t):
     """Next time at which something is switched."""
     goal = np.inf
@@ -46,14 +46,14 @@ def next_clock(settings, ints, reals, t):
     return goal
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def place_of(history, steps, time):
     """Step that holds an instant that has passed, and place on it."""
     j = step_at(history, steps, time)
     return j, (time - history.real[j, START]) / history.real[j, LENGTH]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def take_sample(settings, history, steps, ints, reals, t, y):
     """Switch whatever is due at t; return whether anything was.
 
@@ -82,7 +82,7 @@ def take_sample(settings, history, steps, ints, reals, t, y):
     lag = settings.schedule[gains, PAST_AGE]
     if settings.whole[CURRENT_DELAY] == 1:
         theta, near = state_at(history, j_now, s_now)[2], history.whole[j_now, LAG]
-        j, s = locate_angle(history, settings.q, steps, near, t_now, theta, 0.0)
+        j, s = locate_angle(history, settings.bit, steps, near, t_now, theta, 0.0)
         lag = t_now - history.real[j, START] - s * history.real[j, LENGTH]
     j_then, s_then = place_of(history, steps, t_now - lag)
     earlier = sample - int(np.rint(lag / period))

@@ -116,8 +116,10 @@ class Settings(NamedTuple):
 
     Attributes
     ----------
-    q : tuple
-        Coefficients and the law's own parameters: last argument of the generated functions.
+    bit : tuple
+        Ω0, V0 and n: last argument of `depth`, `turned` and `rates`.
+    q : array
+        Coefficients and the law's own parameters: last argument of `load`.
     whole : int array
         STATES, ...; LINEAR, ...; ROWS; the list of FED.
     real : array
@@ -138,6 +140,7 @@ class Settings(NamedTuple):
         Added to the k-th sample of these outputs.
     """
 
+    bit: Any
     q: Any
     whole: Any
     real: Any

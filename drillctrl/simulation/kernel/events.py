@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .data import (
@@ -36,6 +35,7 @@ from .data import (
     TORSION_RATE,
 )
 from .interpolate import state_at
+from .jit import inner
 from .model import rate_of_change
 from .physics import rates
 from .step import attempt, recall, record
@@ -47,7 +47,7 @@ TANGENTS, REPEATS = 6, 60
 SHORTEST = 1e-14
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def watched(settings, kind, mode):
     """Whether an event can end the present mode."""
     if kind >= AT_LIMIT:
@@ -68,8 +68,8 @@ def watched(settings, kind, mode):
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
-def value_of(kind, mode, probe, dx, dtheta, q):
+@inner
+def value_of(kind, mode, probe, dx, dtheta, bit):
     """Event function: positive in the present mode, zero at its end."""
     if kind >= AT_LIMIT:
         left = probe[P_ROOM + kind - AT_LIMIT]
@@ -84,37 +84,37 @@ def value_of(kind, mode, probe, dx, dtheta, q):
         return -probe[P_DOWN]
     if kind == DEPTH:
         return probe[P_DEPTH] if mode.contact == 1 else -probe[P_DEPTH]
-    axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), q)
+    axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), bit)
     if kind == TORSION_RATE:
         return rotary_rate if mode.torsion == FORWARD else -rotary_rate
     return axial_rate if mode.axial == DOWN else -axial_rate
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def value_on_step(settings, history, steps, mode, kind, s, work):
     """Event function on the step that is written at place ``steps``, at s."""
     probe = work.stages[STAGES]
     if kind in (TORSION_RATE, AXIAL_RATE):
         state = state_at(history, steps, s)
-        return value_of(kind, mode, probe, state[1], state[3], settings.q)
+        return value_of(kind, mode, probe, state[1], state[3], settings.bit)
     y = work.vectors[BETWEEN]
     recall(settings, history, steps, s, y)
     t = history.real[steps, START] + s * history.real[steps, LENGTH]
     rate_of_change(settings, history, steps, mode, t, y, work.rates[STAGES], probe)
-    return value_of(kind, mode, probe, y[1], y[3], settings.q)
+    return value_of(kind, mode, probe, y[1], y[3], settings.bit)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def cannot_vanish(kind, mode, stages, q, tolerance):
+@inner
+def cannot_vanish(kind, mode, stages, bit, tolerance):
     """Whether the stages of a step show an event function far from zero throughout."""
     low, high, probes = np.inf, -np.inf, stages.shape[1] - 2
     for i in range(STAGES):
-        value = value_of(kind, mode, stages[i], stages[i, probes], stages[i, probes + 1], q)
+        value = value_of(kind, mode, stages[i], stages[i, probes], stages[i, probes + 1], bit)
         low, high = min(low, value), max(high, value)
     return low > tolerance and low > 0.5 * (high - low)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def root_between(settings, history, steps, mode, kind, a, fa, b, fb, work):
     """Zero between a (positive) and b (negative) by the Illinois method."""
     side = 0
@@ -136,7 +136,7 @@ def root_between(settings, history, steps, mode, kind, a, fa, b, fb, work):
     return b
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def first_zero(settings, history, steps, mode, kind, work):
     """First s at which an event function turns negative on the step just tried.
 
@@ -149,7 +149,7 @@ def first_zero(settings, history, steps, mode, kind, work):
         s in [0, 1]; 0 if the function is negative from the start, 2 if it never is.
     """
     tolerance = 1e-12 * settings.real[SCALE + kind]
-    if cannot_vanish(kind, mode, work.stages, settings.q, tolerance):
+    if cannot_vanish(kind, mode, work.stages, settings.bit, tolerance):
         return NONE
     values = np.empty(SAMPLES + 1)
     for i in range(SAMPLES + 1):
@@ -188,7 +188,7 @@ def first_zero(settings, history, steps, mode, kind, work):
     return NONE
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def refine(settings, history, steps, mode, kind, t, s, y, work, level):
     """Repeat the step so that it ends where an event function vanishes; return its length.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numba
-
 from .data import (
     LAST_LEVEL,
     LENGTH,
@@ -14,12 +12,13 @@ from .data import (
     TORSION,
     X,
 )
+from .jit import entry, inner
 from .physics import rates, turned
 
 SOLVE_STEPS = 60
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def quintic(c, n, j, s):
     """Value at s of the quintic whose coefficients start in column n of row j."""
     return c[j, n] + s * (
@@ -27,7 +26,7 @@ def quintic(c, n, j, s):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def quintic_slope(c, n, j, s):
     """Derivative in s of the quintic in row j."""
     return c[j, n + 1] + s * (
@@ -36,13 +35,13 @@ def quintic_slope(c, n, j, s):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def quartic(c, n, j, s):
     """Value at s of the quartic whose coefficients start in column n of row j."""
     return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * (c[j, n + 3] + s * c[j, n + 4])))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def state_at(history, j, s):
     """State (x, x', θ, θ') on step j at s."""
     c = history.real
@@ -55,7 +54,7 @@ def state_at(history, j, s):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def fit_quintic(c, n, j, h, value, rate, rate_end, increment, curve, curve_end):
     """Quintic through value, rate and acceleration at both ends (Hermite).
 
@@ -71,34 +70,34 @@ def fit_quintic(c, n, j, h, value, rate, rate_end, increment, curve, curve_end):
     c[j, n + 5] = 6.0 * d - 3.0 * e + 0.5 * f
 
 
-@numba.njit(cache=True, error_model="numpy")
-def pitch_of(q):
+@inner
+def pitch_of(bit):
     """2π/n, from the plant's own condition on the delay."""
     zero = (0.0, 0.0, 0.0, 0.0)
-    return -turned(zero, zero, 0.0, q)
+    return -turned(zero, zero, 0.0, bit)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def beyond(history, q, j, s, t, theta, extra):
+@inner
+def beyond(history, bit, j, s, t, theta, extra):
     """Angle from the bit's angle less the lag back to step j at s; positive if s is too early.
 
     ``extra`` is the lag in angle beyond 2π/n.
     """
     delay = t - history.real[j, START] - s * history.real[j, LENGTH]
     then = (0.0, 0.0, quintic(history.real, THETA, j, s), 0.0)
-    return turned((0.0, 0.0, theta, 0.0), then, delay, q) - extra
+    return turned((0.0, 0.0, theta, 0.0), then, delay, bit) - extra
 
 
-@numba.njit(cache=True, error_model="numpy")
-def angle_slope(history, q, j, s):
+@inner
+def angle_slope(history, bit, j, s):
     """Angle turned per unit of s on step j."""
     h = history.real[j, LENGTH]
     rate = quintic_slope(history.real, THETA, j, s) / h
-    return h * rates((0.0, 0.0, 0.0, rate), q)[1]
+    return h * rates((0.0, 0.0, 0.0, rate), bit)[1]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def locate_angle(history, q, steps, j, t, theta, extra):
+@inner
+def locate_angle(history, bit, steps, j, t, theta, extra):
     """Find the step and s at which the bit was a blade pitch (and ``extra``) back.
 
     The search starts at step j and stays within the smooth piece of the history that j
@@ -112,10 +111,10 @@ def locate_angle(history, q, steps, j, t, theta, extra):
     while (
         j > 0
         and history.whole[j, LEVEL] > LAST_LEVEL
-        and (beyond(history, q, j, 0.0, t, theta, extra) < 0.0)
+        and (beyond(history, bit, j, 0.0, t, theta, extra) < 0.0)
     ):
         j -= 1
-    after = beyond(history, q, j, 1.0, t, theta, extra)
+    after = beyond(history, bit, j, 1.0, t, theta, extra)
     while (
         after > 0.0
         and j + 1 < steps
@@ -123,9 +122,9 @@ def locate_angle(history, q, steps, j, t, theta, extra):
         and history.whole[j + 1, TORSION] != STUCK
     ):
         j += 1
-        after = beyond(history, q, j, 1.0, t, theta, extra)
+        after = beyond(history, bit, j, 1.0, t, theta, extra)
     if after > 0.0 or j == 0:
-        slope = angle_slope(history, q, j, 1.0)
+        slope = angle_slope(history, bit, j, 1.0)
         if j == 0:  # steady motion: linear, without end on either side
             return j, 1.0 + after / slope
         if j + 1 >= steps and after > 1e-9:
@@ -133,23 +132,23 @@ def locate_angle(history, q, steps, j, t, theta, extra):
         if after > 0.2 * slope:
             return j, 1.0
         s = 1.0 + after / slope
-        slope = angle_slope(history, q, j, s)
+        slope = angle_slope(history, bit, j, s)
         if slope > 0.0:
-            s += beyond(history, q, j, s, t, theta, extra) / slope
+            s += beyond(history, bit, j, s, t, theta, extra) / slope
         return j, min(max(s, 1.0), 1.3)
-    before = beyond(history, q, j, 0.0, t, theta, extra)
+    before = beyond(history, bit, j, 0.0, t, theta, extra)
     if before <= 0.0:
         return j, 0.0
     # Newton inside a bracket; the slope is zero where the bit came to rest.
     low, high = 0.0, 1.0
     s = before / (before - after)
     for _ in range(SOLVE_STEPS):
-        value = beyond(history, q, j, s, t, theta, extra)
+        value = beyond(history, bit, j, s, t, theta, extra)
         if value > 0.0:
             low = s
         else:
             high = s
-        slope = angle_slope(history, q, j, s)
+        slope = angle_slope(history, bit, j, s)
         new = s + value / slope if slope > 0.0 else -1.0
         if new < low or new > high:
             new = 0.5 * (low + high)
@@ -161,7 +160,7 @@ def locate_angle(history, q, steps, j, t, theta, extra):
     return j, s
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def locate_time(history, steps, j, time):
     """Find the step and s of an instant, searching from j within its smooth piece."""
     while j > 0 and history.whole[j, LEVEL] > LAST_LEVEL and time < history.real[j, START]:
@@ -175,7 +174,7 @@ def locate_time(history, steps, j, time):
     return j, (time - history.real[j, START]) / history.real[j, LENGTH]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def step_at(history, steps, time):
     """Index of the last step that starts at or before an instant (bisection)."""
     low, high = 0, steps - 1
@@ -188,16 +187,16 @@ def step_at(history, steps, time):
     return low
 
 
-@numba.njit(cache=True, error_model="numpy")
-def step_before_angle(history, q, j, t, theta, extra, tolerance):
+@inner
+def step_before_angle(history, bit, j, t, theta, extra, tolerance):
     """Search from step j, across breaks, for the step in which the lagged angle lies next.
 
     At a break it is the step after it, since the bit goes on forward.
     """
-    while j > 0 and beyond(history, q, j, 0.0, t, theta, extra) < -tolerance:
+    while j > 0 and beyond(history, bit, j, 0.0, t, theta, extra) < -tolerance:
         j -= 1
     while history.whole[j, TORSION] == STUCK or (
-        j > 0 and beyond(history, q, j, 1.0, t, theta, extra) >= -tolerance
+        j > 0 and beyond(history, bit, j, 1.0, t, theta, extra) >= -tolerance
     ):
         j += 1
     return j

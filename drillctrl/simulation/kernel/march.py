@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .breaks import (
@@ -46,6 +45,7 @@ from .data import (
 )
 from .events import NONE, SHORTEST, first_zero, refine, watched
 from .interpolate import locate_time, step_at
+from .jit import entry, inner
 from .model import lag_of, rate_of_change
 from .physics import rates
 from .step import attempt, moving, record
@@ -60,7 +60,7 @@ REFINE = 6
 PASSED = 5e-14
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def mode_of(ints, chain):
     """Collect the present mode."""
     passes = ints[I_PASSES]
@@ -81,7 +81,7 @@ def mode_of(ints, chain):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def workplace(settings):
     """Arrays of the size of the plant."""
     n, m = settings.whole[STATES], settings.whole[INPUTS]
@@ -93,7 +93,7 @@ def workplace(settings):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def enter(settings, history, steps, ints, chain, kind, t, y, work):
     """Enter the mode that follows an event, a break or the start."""
     mode = mode_of(ints, chain)
@@ -104,7 +104,7 @@ def enter(settings, history, steps, ints, chain, kind, t, y, work):
     ints[I_SATURATED] = next_saturation(settings, history, steps, mode, kind, t, y, work)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def level_of(settings, kind):
     """Level of the break that an event makes; see `LAST_LEVEL`."""
     if kind < AT_LIMIT:
@@ -112,7 +112,7 @@ def level_of(settings, kind):
     return 4 if settings.whole[ACTUATOR] == 1 else 3
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def time_limits(settings, history, steps, ints, following, t):
     """Nearest time at which a constant delay meets a break; and the longest step they allow."""
     nearest, longest = np.inf, np.inf
@@ -126,7 +126,7 @@ def time_limits(settings, history, steps, ints, following, t):
     return nearest, longest
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def pass_time_breaks(settings, history, steps, ints, following, t):
     """Move constant delays along; return the level of the break that they bring."""
     level = NO_BREAK
@@ -146,7 +146,7 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
     return level
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def seek_past(settings, history, steps, ints, following, t):
     """Find the delayed outputs anew, where other gains may want older or newer ones."""
     lag = lag_of(settings, 2, ints[GAINS])
@@ -155,7 +155,7 @@ def seek_past(settings, history, steps, ints, following, t):
         following[MAX_FACE_LEVELS + 2] = 0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def pass_angle_break(settings, history, steps, ints, chain, following, which, t, theta):
     """Move the lag in angle over the break that it has met; return the level this brings."""
     b, whole = following[which], settings.whole
@@ -169,13 +169,13 @@ def pass_angle_break(settings, history, steps, ints, chain, following, which, t,
     return level
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def turned_by(settings, t, theta):
     """Size of the angles that a difference of angles is formed of."""
-    return 1.0 + abs(theta) + rates((0.0, 0.0, 0.0, 0.0), settings.q)[1] * abs(t)
+    return 1.0 + abs(theta) + rates((0.0, 0.0, 0.0, 0.0), settings.bit)[1] * abs(t)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def march(settings, history, ints, reals, y, chain, following, end, max_step, tries):
     """Integrate until ``end`` or until the history is full.
 
@@ -197,7 +197,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
     int
         Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
     """
-    q, size = settings.q, moving(settings)
+    bit, size = settings.bit, moving(settings)
     linear = settings.whole[LINEAR] == 1
     first_kind = AT_LIMIT if linear else 0
     kinds = AT_LIMIT
@@ -226,8 +226,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         goal = min(goal, end, next_clock(settings, ints, reals, t))
         near, front = np.inf, np.inf
         if not linear:
-            near, front = angle_limits(history, q, steps, mode, chain, following, t, y, k[0, 3])
-            left, which = least_angle_left(history, q, steps, mode, following, t, y[2])
+            near, front = angle_limits(history, bit, steps, mode, chain, following, t, y, k[0, 3])
+            left, which = least_angle_left(history, bit, steps, mode, following, t, y[2])
             if which >= 0 and left <= PASSED * turned_by(settings, t, y[2]):
                 # No step fits in between.
                 level = pass_angle_break(
@@ -276,11 +276,11 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         if not linear and mode.torsion != STUCK:
             turns = turned_by(settings, t, new[2])
             for _ in range(REFINE):
-                left, which = least_angle_left(history, q, steps, mode, following, t + h, new[2])
+                left, which = least_angle_left(history, bit, steps, mode, following, t + h, new[2])
                 if abs(left) <= 4e-15 * turns:
                     reached = which
                     break
-                rate = rates((0.0, 0.0, 0.0, new[3]), q)[1]
+                rate = rates((0.0, 0.0, 0.0, new[3]), bit)[1]
                 if which < 0 or rate <= 0.0 or (left > 0.0 and not left < 0.1 * h * rate):
                     break
                 if t + h + left / rate >= goal + 1e-15:
@@ -293,7 +293,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                 at_goal = False
                 attempt(settings, history, steps, mode, t, h, y, work)
                 record(settings, history, steps, mode, t, h, y, work, level)
-                left, which = least_angle_left(history, q, steps, mode, following, t + h, new[2])
+                left, which = least_angle_left(history, bit, steps, mode, following, t + h, new[2])
             if reached < 0 and which >= 0 and left < -1e-9 * turns:
                 reals[STEP] = 0.5 * h
                 ints[REJECTED] += 1
@@ -312,7 +312,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                 ints[STALLS] += 1
                 if ints[STALLS] > 20:
                     return COLLAPSE
-                snap(kind, y, q)
+                snap(kind, y, bit)
                 enter(settings, history, steps, ints, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
                 known = False
@@ -350,7 +350,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             if ints[GAINS] != gains:
                 seek_past(settings, history, steps, ints, following, t)
         if kind >= 0:
-            snap(kind, y, q)
+            snap(kind, y, bit)
             level = min(level, level_of(settings, kind))
         # The last stage is the first of the next step, unless something breaks there.
         known = level == NO_BREAK and reached < 0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numba
-
 from .data import (
     ACTUATOR,
     BY_TORQUE,
@@ -49,10 +47,11 @@ from .data import (
     WEIGHT,
 )
 from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
+from .jit import entry, inner
 from .physics import depth, load, rates
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def top_at(drive, piece, t):
     """Motion of the top end beyond V0 t and Ω0 t: x, x', θ, θ'."""
     dt = t - drive[piece, DRIVE_T]
@@ -65,7 +64,7 @@ def top_at(drive, piece, t):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def strength_at(drive, piece, t):
     """Rock strength relative to the starting point's."""
     return (
@@ -74,7 +73,7 @@ def strength_at(drive, piece, t):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def piece_at(times, t):
     """Index of the last entry of a rising list that is not after t (the first otherwise)."""
     k = 0
@@ -83,7 +82,7 @@ def piece_at(times, t):
     return k
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def row_of(whole, value, i, y):
     """Row i of the matrix of `Settings` times y."""
     total = 0.0
@@ -92,14 +91,14 @@ def row_of(whole, value, i, y):
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def noise_of(noise, sample, f):
     """Noise of the output that is fed back in place f, in the sample that measured it."""
     count = noise.shape[0]
     return 0.0 if sample < 0 or count == 0 else noise[min(sample, count - 1), f]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def add_earlier(settings, history, which, row, place, sample, y):
     """Add to the places of u what gains give on the outputs at an earlier instant.
 
@@ -126,7 +125,7 @@ def add_earlier(settings, history, which, row, place, sample, y):
             y[n + 2 * m + i] += gains[which, row, i, f] * total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def add_present(settings, which, row, y):
     """Add to the places of u what gains give on the outputs now."""
     whole, gains = settings.whole, settings.gains
@@ -137,13 +136,13 @@ def add_present(settings, which, row, y):
             y[n + 2 * m + i] += gains[which, row, i, f] * output
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def within(value, limit):
     """The value, or the limit it is beyond."""
     return min(max(value, -limit), limit)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def lag_of(settings, i, gains):
     """Constant delays: of the linear model, the measured and the fed back signal; 0: none."""
     if i < 2:
@@ -151,7 +150,7 @@ def lag_of(settings, i, gains):
     return 0.0 if settings.whole[SAMPLED] == 1 else settings.schedule[gains, PAST_AGE]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def command_at(settings, history, steps, mode, t, y, place):
     """Write the command of the controller at t, before its limits, into the places of u."""
     n, m = settings.whole[STATES], settings.whole[INPUTS]
@@ -175,7 +174,7 @@ def command_at(settings, history, steps, mode, t, y, place):
             add_present(settings, which, mode.gains, y)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def feed_back(settings, history, steps, mode, t, y, place, out, probe):
     """Write the inputs to the plant at t: commands, or actuators that follow with a lag (Eq. 36).
 
@@ -201,7 +200,7 @@ def feed_back(settings, history, steps, mode, t, y, place, out, probe):
         probe[P_ROOM + 2 * m + i] = value
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     """Right-hand side on one branch; False if a delayed instant lies beyond the history.
 
@@ -214,21 +213,21 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     probe : array
         Takes depth, accelerations at the limits of what contact can bear, loads, delay, inputs.
     """
-    q, n = settings.q, settings.whole[STATES]
+    bit, n = settings.bit, settings.whole[STATES]
     state = (y[0], y[1], y[2], y[3])
     if settings.whole[LINEAR] == 1:
         return linear_rate(settings, history, steps, mode, t, y, out, probe)
-    j, s = locate_angle(history, q, steps, mode.lag, t, y[2], 0.0)
+    j, s = locate_angle(history, bit, steps, mode.lag, t, y[2], 0.0)
     if j < 0:
         return False
     delay = t - history.real[j, START] - s * history.real[j, LENGTH]
     place = t - delay, j, s
     since = delay
     if mode.passes > 1:
-        extra = (mode.passes - 1) * pitch_of(q)
-        j, s = locate_angle(history, q, steps, mode.face, t, y[2], extra)
+        extra = (mode.passes - 1) * pitch_of(bit)
+        j, s = locate_angle(history, bit, steps, mode.face, t, y[2], extra)
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
-    d = depth(state, state_at(history, j, s), since, q)
+    d = depth(state, state_at(history, j, s), since, bit)
     strength = 1.0
     if settings.drive.shape[0] > 1:
         moved, top = top_at(settings.drive, mode.piece, t), n + 3 * settings.whole[INPUTS]
@@ -243,7 +242,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         row_of(settings.whole, settings.value, 1, y),
         row_of(settings.whole, settings.value, 3, y),
         strength * d,
-        rates(state, q),
+        rates(state, bit),
         mode.contact,
         mode.torsion,
         mode.axial,
@@ -263,9 +262,9 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, probe):
-    """Weight and torque on q, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
+    """Weight and torque on bit, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
     At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
     torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5).
@@ -280,7 +279,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, 
         Z' and Φ'.
     contact, torsion, direction : int
         The mode; ``direction`` is the axial one.
-    real, q : array, tuple
+    real, q : array
         As in `Settings`.
     probe : array
         Takes the loads, and the accelerations at the ends of what they can be.
@@ -317,7 +316,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, 
     return weight, torque
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def linear_rate(settings, history, steps, mode, t, y, out, probe):
     """Right-hand side of the linear model (Eqs. 22, 34)."""
     n, lag = settings.whole[STATES], settings.real[LAGS + 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .data import (
@@ -40,12 +39,13 @@ from .data import (
     Mode,
 )
 from .interpolate import step_at
+from .jit import entry, inner
 from .model import lag_of, piece_at, rate_of_change, row_of
 from .physics import load, rates
 from .step import recall
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def mode_on(settings, history, j):
     """The mode in which step j was taken."""
     t = history.real[j, START] + 0.5 * history.real[j, LENGTH]
@@ -72,7 +72,7 @@ def mode_on(settings, history, j):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@entry
 def evaluate(settings, history, steps, places, times, wanted):
     """Return some columns at some instants, each on a given step, (len(wanted), len(times)).
 
@@ -82,7 +82,7 @@ def evaluate(settings, history, steps, places, times, wanted):
     result = np.zeros((wanted.shape[0], times.shape[0]))
     y, out, probe = np.zeros(n + 3 * m + 6), np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
     # At rest the velocity is known; its interpolation is off by rounding.
-    standing = rates((0.0, 0.0, 0.0, 0.0), settings.q)
+    standing = rates((0.0, 0.0, 0.0, 0.0), settings.bit)
     linear = settings.whole[LINEAR] == 1
     for i in range(times.shape[0]):
         j, t = places[i], times[i]
@@ -96,7 +96,7 @@ def evaluate(settings, history, steps, places, times, wanted):
                 y[1] = -standing[0]
         rate_of_change(settings, history, steps, mode, t, y, out, probe)
         if linear:
-            speeds = rates((y[0], y[1], y[2], y[3]), settings.q)
+            speeds = rates((y[0], y[1], y[2], y[3]), settings.bit)
             probe[P_WEIGHT], probe[P_TORQUE] = load((probe[P_DEPTH], 1.0, 1.0), speeds, settings.q)
         for c in range(wanted.shape[0]):
             which = wanted[c]

@@ -8,7 +8,6 @@ cost; that of all else is the pair's continuous extension of order 4 (Shampine, 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from .data import (
@@ -37,6 +36,7 @@ from .data import (
     X,
 )
 from .interpolate import fit_quintic, quartic, state_at
+from .jit import inner
 from .model import rate_of_change
 
 NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
@@ -86,14 +86,14 @@ DENSE = np.array(
 )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def moving(settings):
     """Number of entries of y that are integrated: states, and actuators if there are any."""
     n = settings.whole[STATES]
     return n + settings.whole[INPUTS] if settings.whole[ACTUATOR] == 1 else n
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def attempt(settings, history, steps, mode, t, h, y, work):
     """Try a step from t to t + h.
 
@@ -144,7 +144,7 @@ def attempt(settings, history, steps, mode, t, h, y, work):
     return worst
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def record(settings, history, j, mode, t, h, y, work, level):
     """Write a step into place j of the history."""
     last, real, whole = STAGES - 1, history.real, history.whole
@@ -169,7 +169,7 @@ def record(settings, history, j, mode, t, h, y, work, level):
     whole[j, PASSES], whole[j, SATURATED] = mode.passes, mode.saturated
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def recall(settings, history, j, s, y):
     """Write states, actuators and held outputs on step j at s into the vector of `Settings`."""
     n, m, real = settings.whole[STATES], settings.whole[INPUTS], history.real

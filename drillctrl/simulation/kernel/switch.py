@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numba
-
 from .data import (
     AT_LIMIT,
     AXIAL_RATE,
@@ -35,11 +33,12 @@ from .data import (
     Mode,
 )
 from .events import watched
+from .jit import inner
 from .model import rate_of_change
 from .physics import rates
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def with_branch(mode, contact, torsion, axial):
     """The mode on another branch."""
     return Mode(
@@ -59,17 +58,17 @@ def with_branch(mode, contact, torsion, axial):
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
-def snap(kind, y, q):
+@inner
+def snap(kind, y, bit):
     """Make a velocity that has just been found to vanish vanish exactly."""
-    zero = rates((0.0, 0.0, 0.0, 0.0), q)
+    zero = rates((0.0, 0.0, 0.0, 0.0), bit)
     if kind == AXIAL_RATE:
         y[1] = -zero[0]
     elif kind == TORSION_RATE:
         y[3] = -zero[1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def next_saturation(settings, history, steps, mode, kind, t, y, work):
     """Which limits hold the inputs after an event or a jump, as bits; see `Mode`."""
     if kind >= AT_LIMIT:
@@ -84,7 +83,7 @@ def next_saturation(settings, history, steps, mode, kind, t, y, work):
     return saturated
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner
 def next_mode(settings, history, steps, mode, kind, t, y, work):
     """Return contact, torsion and axial branch after an event, or at the start.
 
@@ -95,7 +94,7 @@ def next_mode(settings, history, steps, mode, kind, t, y, work):
     if settings.whole[LINEAR] == 1:
         return 1, FORWARD, DOWN
     out, probe = work.rates[STAGES], work.stages[STAGES]
-    axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.q)
+    axial_rate, rotary_rate = rates((y[0], y[1], y[2], y[3]), settings.bit)
     push, turn = (
         1e-13 * settings.real[SCALE + HELD_TO_UP],
         1e-13 * settings.real[SCALE + RELEASE_FORWARD],
