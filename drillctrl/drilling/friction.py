@@ -13,7 +13,7 @@ from drillctrl.drilling.coefficients import Coefficients
 class Stribeck(BitRock):
     """The paper's law with a torque that falls as the bit turns faster.
 
-    To the wear torque β (of Eq. 3) comes ``drop`` exp(−|Φ'|/``decay``), as far as the wear
+    To the wear torque β (of Eq. 3) comes ``drop`` exp(−abs(Φ')/``decay``), as far as the wear
     flat is pressed. At the steady speed Ω0 the torque falls by drop/decay exp(−Ω0/decay) per
     unit of speed.
 
