@@ -140,7 +140,8 @@ def gain_surface(
     ]
     fixed = chosen.gains(np.zeros(2))
     exact = chart(point, axes[0], axes[1], chosen, *fixed)
-    return GainSurface(case, exact, design(case, chosen), x, y, radius, m, order)
+    optimum = design(case, chosen, trials=False)
+    return GainSurface(case, exact, optimum, x, y, radius, m, order)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,14 @@ import click
 
 from drillctrl.cli.gains import read_gains
 from drillctrl.cli.point import point_options, read_point
-from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+from drillctrl.cli.roots import (
+    NOT_STABILISED,
+    check_outputs,
+    deliver,
+    root_output_options,
+    trials_option,
+    wants_trials,
+)
 from drillctrl.cli.verb import Verb
 
 
@@ -19,7 +26,8 @@ from drillctrl.cli.verb import Verb
 @click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
 @click.option("--m", type=int, help="Intervals of the semi-discretisation reported.")
 @click.option("--order", type=int, default=2, show_default=True, help="Its order: 0, 1 or 2.")
-@click.option("--require-stable", is_flag=True, help="Exit with 3 if the loop is not stable.")
+@click.option("--require-stable", is_flag=True, help="Exit with 3 if it is not stable, or refused.")
+@trials_option("none")
 @root_output_options
 def analyze_command(
     structure: str | None,
@@ -27,6 +35,7 @@ def analyze_command(
     k2: str | None,
     m: int | None,
     order: int,
+    trials: str,
     require_stable: bool,
     prove: bool,
     as_json: bool,
@@ -46,7 +55,7 @@ def analyze_command(
     from drillctrl.designs.design import analyze
 
     gains = read_gains("K1", k1), read_gains("K2", k2)
-    result = analyze(where, structure, *gains, m=m, order=order)
+    result = analyze(where, structure, *gains, m=m, order=order, trials=wants_trials(trials))
     deliver(result, prove, as_json, out, plot)
-    if require_stable and not result.stable:
+    if require_stable and (not result.stable or result.verdict.refused):
         raise click.exceptions.Exit(NOT_STABILISED)

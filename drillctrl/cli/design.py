@@ -14,7 +14,14 @@ from drillctrl.cli.objective import (
     requirement_options,
 )
 from drillctrl.cli.point import point_options, read_point
-from drillctrl.cli.roots import NOT_STABILISED, check_outputs, deliver, root_output_options
+from drillctrl.cli.roots import (
+    NOT_STABILISED,
+    check_outputs,
+    deliver,
+    root_output_options,
+    trials_option,
+    wants_trials,
+)
 from drillctrl.cli.verb import Verb
 
 
@@ -38,13 +45,15 @@ from drillctrl.cli.verb import Verb
 @click.option(
     "--require-stable",
     is_flag=True,
-    help="Exit with 3 if nothing stabilises, or a requirement is not met.",
+    help="Exit with 3 if nothing stabilises or is recommended, or a requirement is not met.",
 )
+@trials_option("all")
 @root_output_options
 def design_command(
     structure: str,
     bound: tuple[str, ...],
     seed: int,
+    trials: str,
     require_stable: bool,
     prove: bool,
     as_json: bool,
@@ -72,7 +81,9 @@ def design_command(
         objective=objective,
         requirements=requirements,
         seed=seed,
+        trials=wants_trials(trials),
     )
     deliver(result, prove, as_json, out, plot)
-    if require_stable and not (result.stable and result.requirements_met):
+    met = result.stable and result.requirements_met and not result.verdict.refused
+    if require_stable and not met:
         raise click.exceptions.Exit(NOT_STABILISED)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
 
 if TYPE_CHECKING:
@@ -29,6 +30,29 @@ def root_output_options(command: Command) -> Command:
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def trials_option(default: str) -> Callable[[Command], Command]:
+    """Return what adds the option that says whether gains are tried."""
+    return click.option(
+        "--trials",
+        default=default,
+        show_default=True,
+        help="Try the gains on the nonlinear motion beside no control: all starts, or none.",
+    )
+
+
+def wants_trials(given: str) -> bool:
+    """Return whether gains are to be tried.
+
+    Raises
+    ------
+    InputError
+        If the option says neither.
+    """
+    if given not in ("all", "none"):
+        raise InputError("--trials", given, "all or none")
+    return given == "all"
 
 
 def check_outputs(out: str | None, plot: str | None) -> None:

@@ -33,6 +33,7 @@ def design(
     objective: Objective = EXACT,
     requirements: Requirements = NO_REQUIREMENTS,
     seed: int = 0,
+    trials: bool | None = True,
 ) -> Design:
     """Design bounded gains that minimise the spectral abscissa of the closed loop.
 
@@ -50,12 +51,15 @@ def design(
         What must hold beside the bounds.
     seed : int
         Of the starting points. The same seed gives the same gains.
+    trials : bool, optional
+        Whether the gains are then tried on the nonlinear motion, beside no control.
 
     Returns
     -------
     Design
-        The best gains found, whether or not they stabilise and meet the requirements: look
-        at ``stable`` and ``requirements_met``.
+        The best gains found, whether or not they stabilise, meet the requirements, and do
+        good on the nonlinear motion: look at ``stable``, ``requirements_met`` and
+        ``recommended``.
 
     Raises
     ------
@@ -77,6 +81,8 @@ def design(
     result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
     value = problem.reported_value(family, objective, solution.gains)
+    if trials:
+        result = result.tried()
     return replace(
         result,
         objective=objective,
@@ -115,6 +121,7 @@ def analyze(
     *,
     m: int | None = None,
     order: int = DEFAULT_ORDER,
+    trials: bool | None = False,
 ) -> Design:
     """Analyse given gains, or the open loop.
 
@@ -129,6 +136,8 @@ def analyze(
         back.
     m, order : int, optional
         Of the semi-discretisation that is reported; see `semidiscretize`.
+    trials : bool, optional
+        Whether the gains are tried on the nonlinear motion, beside no control.
 
     Raises
     ------
@@ -149,6 +158,8 @@ def analyze(
             raise InputError("K2", "(missing)", f"given for structure {chosen.name}")
         gains = gain_matrices(chosen, K1, K2)
         result = assess(as_case(point), chosen, *gains, m, order)
+    if trials:
+        result = result.tried()
     result = replace(result, elapsed_seconds=time.perf_counter() - began, seek=_remedies)
     if m is not None or order != DEFAULT_ORDER:
         # Refused now rather than when it is read.

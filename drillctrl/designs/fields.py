@@ -39,6 +39,10 @@ def design_fields(design: Design) -> dict[str, Any]:
             "spectral_abscissa": design.open_loop.spectral_abscissa,
             "stable": design.open_loop.stable,
         },
+        "recommended": design.recommended,
+        "reason": design.reason,
+        "trials": [trial.to_dict() for trial in design.trials],
+        "modes_worse": [mode.to_dict() for mode in design.modes_worse],
         "robustness": None,
         "evaluations": design.evaluations,
         "elapsed_seconds": design.elapsed_seconds,
@@ -64,7 +68,7 @@ def design_fields(design: Design) -> dict[str, Any]:
 
 def has_alternative(design: Design) -> bool:
     """Whether a neighbour that decays more slowly is of use: not if one was designed for."""
-    return design.minimises_alpha and design.stable
+    return design.minimises_alpha and design.stable and not design.verdict.refused
 
 
 def _boundary_fields(design: Design) -> dict[str, Any] | None:
@@ -115,6 +119,8 @@ def _alternative_fields(design: Design) -> dict[str, Any]:
         "K2": other.K2.ravel().tolist(),
         "spectral_abscissa": other.spectral_abscissa,
         "stable": other.stable,
+        "recommended": other.recommended,
+        "reason": other.reason,
         "robustness": {
             **_distance_fields(other),
             "spectral_abscissa_with": dataclasses.asdict(other.fragility),

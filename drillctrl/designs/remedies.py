@@ -94,7 +94,7 @@ def remedies(
         if kind == "structure" and any(remedy.kind == kind for remedy in found):
             # The presets become richer: the first that stabilises is the simplest.
             continue
-        result = design(failed.case, candidate)
+        result = design(failed.case, candidate, trials=False)
         if result.stable:
             found.append(Remedy(kind, candidate.name, result))
     faster = _stable_speed(failed, analyze)

@@ -12,6 +12,7 @@ from drillctrl.designs.worst_case import WorstCase
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.steady import steady_state
 from drillctrl.robustness.margins import ParameterMargin
+from drillctrl.simulation.outcome import SETTLES, Figures
 from drillctrl.synthesis.objectives import Robust, SemiDiscrete
 
 if TYPE_CHECKING:
@@ -24,12 +25,61 @@ _GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
 
 def design_summary(design: Design) -> str:
     """Return the summary of a design or analysis for people."""
-    lines = [*_point_lines(design), *_gain_lines(design), *_verdict_lines(design)]
+    lines = [
+        *_trial_lines(design),
+        *_point_lines(design),
+        *_gain_lines(design),
+        *_verdict_lines(design),
+    ]
     width = max(len(label) for label, _ in lines) + 2
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
 
 
 _Lines = list[tuple[str, str]]
+_VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
+
+
+def _trial_lines(design: Design) -> _Lines:
+    """Say first whether the gains can be recommended, and what the runs showed."""
+    if design.structure is None:
+        return []
+    lines: _Lines = [(_VERDICTS[design.recommended], design.reason)]
+    if design.verdict.refused:
+        lines.append(("", "no gains are offered for this point; those below are refused"))
+    for trial in design.trials:
+        free = trial.uncontrolled
+        text = f"{trial.start}: {_figures_text(trial.controlled)}"
+        text += f", |u| ≤ {_input_text(design, trial.controlled.max_abs_u)}"
+        if free is not None:
+            text += f"; without control: {_figures_text(free)}"
+        lines.append(("Trial runs" if trial is design.trials[0] else "", text))
+    for mode in design.modes_worse:
+        kind = mode.kind or "mixed"
+        before, after = _root_text(mode.open_loop), _root_text(mode.root)
+        first = mode is design.modes_worse[0]
+        lines.append(("Worse damped" if first else "", f"{kind} mode: {before} becomes {after}"))
+    return lines
+
+
+def _figures_text(found: Figures) -> str:
+    text = found.outcome
+    if found.swing is not None and found.outcome != SETTLES:
+        text += f", swing {found.swing:.3f}"
+    if found.stick_fraction:
+        text += f", stick {found.stick_fraction:.1%}"
+    return text
+
+
+def _input_text(design: Design, largest: float) -> str:
+    assert design.structure is not None
+    if design.rig_point is None or design.structure.inputs != ("torque",):
+        return f"{largest:.3g}"
+    newton_metres = largest * design.rig_point.rig.torsional_stiffness
+    return f"{units.from_si(newton_metres, units.TORQUE, 'kN*m'):.3g} kN·m"
+
+
+def _root_text(s: complex) -> str:
+    return f"{s.real:.4g}" + (f" ± {s.imag:.4g}i" if s.imag else "")
 
 
 def _point_lines(design: Design) -> _Lines:
@@ -85,7 +135,8 @@ def _gain_lines(design: Design) -> _Lines:
     law = f"u = K1·({', '.join(outputs)})" if len(outputs) > 1 else f"u = K1·{outputs[0]}"
     if past:
         law += " + K2·(the same, τ0 ago)"
-    lines: _Lines = [("Feedback", f"{structure.name}: {law}")]
+    refused = " (refused)" if design.verdict.refused else ""
+    lines: _Lines = [("Feedback", f"{structure.name}{refused}: {law}")]
     rows = [("K1", "", design.K1, structure.K1_lower, structure.K1_upper)]
     if past:
         rows.append(("K2", " delayed", design.K2, structure.K2_lower, structure.K2_upper))
@@ -165,6 +216,9 @@ def _verdict_lines(design: Design) -> _Lines:
         )
         lines.append(("", ""))
         lines.append(("More robust", f"{gains}"))
+        if other.trials:
+            word = "recommended" if other.recommended else "REFUSED"
+            lines.append(("", f"{word}: {other.reason}"))
         lines.append(("", f"α = {_alpha(other.loop)}: at most {GIVE_UP:.0%} of the decay given up"))
         lines += _robustness_lines(other)
     return lines

@@ -24,7 +24,11 @@ from drillctrl.designs.loop_analysis import (
     discretised_radius,
 )
 from drillctrl.designs.margins import point_margins
+from drillctrl.designs.mode_shift import ModeShift, mode_shifts
+from drillctrl.designs.trials import Trial
+from drillctrl.designs.verdict import UNTRIED, Verdict, try_gains
 from drillctrl.drilling.case import Case
+from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin
 from drillctrl.robustness.radius import StabilityRadius, stability_radius
@@ -72,6 +76,8 @@ class Design:
         What was required beside.
     requirements_met : bool
         Whether the loop fulfils them.
+    verdict : Verdict
+        What trial runs on the nonlinear motion say of the gains, if there were any.
     optimality : OptimalityCertificate or None
         Evidence that no better gains lie within the bounds; None for given gains.
     evaluations : int
@@ -94,6 +100,7 @@ class Design:
     objective_value: float | None = None
     requirements: Requirements = NO_REQUIREMENTS
     requirements_met: bool = True
+    verdict: Verdict = UNTRIED
     optimality: OptimalityCertificate | None = None
     evaluations: int = 0
     elapsed_seconds: float = 0.0
@@ -118,6 +125,36 @@ class Design:
     def stable(self) -> bool:
         """Whether the closed loop is asymptotically stable."""
         return self.loop.stable
+
+    @property
+    def recommended(self) -> bool | None:
+        """Whether trial runs speak for the gains; None where they were not tried."""
+        return self.verdict.recommended
+
+    @property
+    def reason(self) -> str:
+        """Why they are recommended, refused or untried."""
+        return self.verdict.reason
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """Trial runs with the gains and without control."""
+        return self.verdict.trials
+
+    def tried(self) -> Design:
+        """Return the same gains after trial runs on the nonlinear motion."""
+        known = self.case.plant == paper_plant()
+        gains = self.structure, self.K1, self.K2
+        return replace(self, verdict=try_gains(self.point, *gains, self.stable, known_plant=known))
+
+    @functools.cached_property
+    def modes_worse(self) -> tuple[ModeShift, ...]:
+        """Modes that decay more slowly with the gains than without; see `mode_shifts`."""
+        if self.structure is None:
+            return ()
+        states = () if self.case.plant is None else self.case.plant.state_names
+        shifts = mode_shifts(self.plant, self.structure, self.K1, self.K2, states)
+        return tuple(shift for shift in shifts if shift.worse)
 
     @property
     def minimises_alpha(self) -> bool:
@@ -217,6 +254,8 @@ class Design:
         ]
         gains = robust_alternative(family, perturbed, here, self.spectral_abscissa, share)
         result = assess(self.case, self.structure, *self.structure.gains(gains))
+        if self.trials:
+            result = result.tried()
         return replace(result, elapsed_seconds=time.perf_counter() - began)
 
     def prove(self) -> Proof:

@@ -149,7 +149,9 @@ def _searched(family: LoopFamily, task: NodeTask) -> Search:
 
 def _design_otherwise(task: NodeTask) -> NodeDesign:
     """Minimise another objective than the abscissa, by the same route as `design`."""
-    result = design(task.point, task.structure, objective=task.objective, seed=task.seed)
+    result = design(
+        task.point, task.structure, objective=task.objective, seed=task.seed, trials=False
+    )
     assert result.optimality is not None
     return NodeDesign(
         task.index,

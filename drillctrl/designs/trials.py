@@ -1,0 +1,143 @@
+"""Trial runs: gains on the nonlinear motion beside the same runs without control."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.outcome import SETTLES, Figures, figures, grows_without_bound
+from drillctrl.simulation.run import simulate
+
+# How long a run is: this many times the decay time of the torsional mode's own damping, of
+# which the bit takes half or more away, so that what a start has left is below the swing
+# that is compared; within the limits, where there is little damping or a lot.
+_DECAYS, _SHORTEST, _LONGEST = 15.0, 150.0, 400.0
+# A motion that grows turns ever faster, and each turn takes steps: it is found in a run of
+# few steps before a longer one is made.
+_FEW, _MANY = 8_000, 300_000
+_RTOL = 1e-7
+
+
+@dataclass(frozen=True)
+class Start:
+    """A perturbation of steady drilling.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    feed, speed : float
+        Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
+    """
+
+    name: str
+    feed: float
+    speed: float
+
+    def initial(self, point: OperatingPoint) -> dict[str, float]:
+        """Return the perturbation by state name."""
+        return {"dx": self.feed * point.penetration_rate, "dtheta": self.speed * point.omega0}
+
+
+STARTS = (Start("small", 0.05, 0.1), Start("kick", 0.5, 0.5), Start("back", 0.5, -0.5))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What became of one start.
+
+    Attributes
+    ----------
+    start : str
+        Name of the start.
+    controlled : Figures
+        With the gains.
+    uncontrolled : Figures or None
+        Without; None where nothing depended on it.
+    """
+
+    start: str
+    controlled: Figures
+    uncontrolled: Figures | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields."""
+        free = self.uncontrolled
+        return {
+            "start": self.start,
+            "controlled": self.controlled.to_dict(),
+            "uncontrolled": None if free is None else free.to_dict(),
+        }
+
+
+def trial_duration(point: OperatingPoint) -> float:
+    """Return the dimensionless time in which a slow torsional motion shows what it tends to."""
+    usual = _DECAYS / point.kappa if point.kappa > 0.0 else _LONGEST
+    return min(max(usual, _SHORTEST), _LONGEST)
+
+
+def trial_run(point: OperatingPoint, controller: Controller | None, start: Start) -> Figures:
+    """Return what becomes of one start, with control or without."""
+    for most in (_FEW, _MANY):
+        run = simulate(
+            point,
+            controller,
+            duration=trial_duration(point),
+            initial=start.initial(point),
+            rtol=_RTOL,
+            max_steps=most,
+        )
+        if run.status != "step limit" or grows_without_bound(run):
+            break
+    return figures(run)
+
+
+def uncontrolled_runs(point: OperatingPoint) -> dict[str, Figures]:
+    """Return what becomes of every start without control, by its name."""
+    return {start.name: trial_run(point, None, start) for start in STARTS}
+
+
+def trial_runs(
+    point: OperatingPoint,
+    controller: Controller,
+    *,
+    uncontrolled: dict[str, Figures] | None = None,
+    spare: bool = False,
+) -> tuple[Trial, ...]:
+    """Try a controller from every start, beside the same runs without it.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Where the rig drills.
+    controller : Controller
+        With its gains, and whatever limits, delays and clock it has.
+    uncontrolled : dict, optional
+        What `uncontrolled_runs` returned for the point.
+    spare : bool
+        Leave out runs on which no verdict depends: those without control where the controller
+        settles, and all further ones once it does harm.
+    """
+    return tuple(_trials(point, controller, uncontrolled, spare))
+
+
+def _trials(
+    point: OperatingPoint,
+    controller: Controller,
+    uncontrolled: dict[str, Figures] | None,
+    spare: bool,
+) -> Iterable[Trial]:
+    for start in STARTS:
+        mine = trial_run(point, controller, start)
+        if uncontrolled is not None:
+            free = uncontrolled[start.name]
+        elif spare and (mine.outcome == SETTLES or mine.swing is None):
+            free = None
+        else:
+            free = trial_run(point, None, start)
+        yield Trial(start.name, mine, free)
+        if spare and mine.swing is None:
+            return

@@ -1,0 +1,211 @@
+"""Whether gains can be recommended: what their trial runs showed, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drillctrl.base.errors import InputError
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.trials import Trial, trial_runs
+from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.outcome import (
+    BOUNCES,
+    DIVERGES,
+    LATE,
+    ORBIT,
+    SETTLES,
+    STALLS,
+    STICK_SLIP,
+    TURNS_BACK,
+    UNDECIDED,
+    Figures,
+)
+from drillctrl.spectrum.characteristic import FloatArray
+
+# Differences between two runs below which they are alike: irregular motions repeat their
+# figures no better.
+_SWING, _STUCK, _FEED = 0.02, 0.02, 0.05
+_SEVERITY = {LATE: 1, STALLS: 2, TURNS_BACK: 3, DIVERGES: 4}
+_WORDS = {
+    SETTLES: "the motion settles",
+    ORBIT: "the bit goes on swinging",
+    BOUNCES: "the bit bounces",
+    STICK_SLIP: "the bit sticks and slips",
+    LATE: "the bit falls behind the feed",
+    STALLS: "the bit stands still",
+    TURNS_BACK: "the bit turns backwards",
+    DIVERGES: "the motion grows without bound",
+    UNDECIDED: "the run breaks off for a numerical reason and proves nothing",
+}
+_STARTS = {
+    "small": "a small disturbance",
+    "kick": "a kick forward by half the speed",
+    "back": "a kick back by half the speed",
+}
+NO_GAINS = "there is no feedback to try"
+LEFT_OUT = "the gains have not been tried on the nonlinear motion"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What trial runs say of gains.
+
+    Attributes
+    ----------
+    recommended : bool or None
+        None where they were not tried.
+    reason : str
+        One sentence.
+    trials : tuple of Trial
+        What was run; empty where nothing was.
+    """
+
+    recommended: bool | None
+    reason: str
+    trials: tuple[Trial, ...] = ()
+
+    @property
+    def refused(self) -> bool:
+        """Whether the gains were tried and are not recommended."""
+        return self.recommended is False
+
+
+UNTRIED = Verdict(None, LEFT_OUT)
+
+
+def try_gains(
+    point: OperatingPoint | None,
+    structure: FeedbackStructure | None,
+    K1: FloatArray,
+    K2: FloatArray,
+    stable: bool,
+    *,
+    known_plant: bool = True,
+    spare: bool = False,
+) -> Verdict:
+    """Try gains on the nonlinear motion, and judge them.
+
+    Parameters
+    ----------
+    point : OperatingPoint or None
+        Where the rig drills; None for a plant of which no nonlinear model is known.
+    structure, K1, K2
+        The feedback.
+    stable : bool
+        Whether the linear loop is.
+    known_plant : bool
+        Whether the simulator's physics are those of the plant.
+    spare : bool
+        As in `trial_runs`.
+    """
+    if structure is None:
+        return Verdict(None, NO_GAINS)
+    if point is None or not known_plant:
+        return Verdict(None, f"{LEFT_OUT}: no nonlinear model of this plant is known")
+    try:
+        controller = Controller(structure, K1, K2)
+    except InputError as error:
+        return Verdict(None, f"{LEFT_OUT}: the simulator cannot close this loop ({error})")
+    trials = trial_runs(point, controller, spare=spare)
+    return judge(trials, stable)
+
+
+def judge(trials: Sequence[Trial], stable: bool) -> Verdict:
+    """Say whether gains can be recommended.
+
+    They are refused where from any start they do worse than no control, and where they
+    neither stabilise nor do measurable good.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        At least one.
+    stable : bool
+        Whether the linear loop is.
+    """
+    runs = tuple(trials)
+    for trial in runs:
+        if (harm := _harm(trial)) is not None:
+            return Verdict(False, harm, runs)
+    good = next((text for trial in runs if (text := _good(trial)) is not None), None)
+    settled = [trial for trial in runs if trial.controlled.outcome == SETTLES]
+    if not settled and good is None:
+        what = "they do not settle it" if stable else "they do not stabilise smooth drilling"
+        return Verdict(False, f"{what}, and do no measurable good: {_beside(runs[0])}", runs)
+    if len(settled) == len(runs):
+        return Verdict(True, "with these gains the motion settles from every start", runs)
+    if not settled:
+        return Verdict(True, f"smooth drilling is not reached, but {good}", runs)
+    rest = next(trial for trial in runs if trial not in settled)
+    small = f"the motion settles from {_STARTS[settled[0].start]}, but not from every start"
+    return Verdict(True, f"{small}: {_beside(rest)}", runs)
+
+
+def _beside(trial: Trial) -> str:
+    """Say what a start led to, with the gains and without."""
+    mine, free = trial.controlled, trial.uncontrolled
+    text = f"after {_STARTS[trial.start]} {_what(mine)}"
+    return text if free is None else f"{text}; without control {_what(free)}"
+
+
+def _what(found: Figures) -> str:
+    text = _WORDS[found.outcome]
+    return text if found.swing is None or found.outcome == SETTLES else f"{text} ({_swing(found)})"
+
+
+def _harm(trial: Trial) -> str | None:
+    """Say in what the controlled run is worse, if it is."""
+    mine, free = trial.controlled, trial.uncontrolled
+    ends = _SEVERITY.get(mine.outcome, 0)
+    if mine.outcome in (TURNS_BACK, DIVERGES):
+        return _beside(trial)
+    if free is None:
+        # Left out where nothing can be worse than without control, or all is said already.
+        return None if mine.outcome == SETTLES else _beside(trial)
+    if ends > _SEVERITY.get(free.outcome, 0):
+        return _beside(trial)
+    if mine.outcome == UNDECIDED and free.outcome != UNDECIDED:
+        return _beside(trial)
+    after = f"after {_STARTS[trial.start]}"
+    if _more(mine.swing, free.swing, _SWING):
+        return f"{after} the bit swings more than without control: {_swing(mine, free)}"
+    if _more(mine.stick_fraction, free.stick_fraction, _STUCK):
+        shares = _percent(mine.stick_fraction, free.stick_fraction)
+        return f"{after} the bit sticks for {shares} of the time"
+    if _more(free.feed, mine.feed, _FEED):
+        return f"{after} the bit advances at {_percent(mine.feed, free.feed)} of the feed"
+    return None
+
+
+def _good(trial: Trial) -> str | None:
+    """Say in what the controlled run is better, if it is."""
+    mine, free = trial.controlled, trial.uncontrolled
+    if free is None or UNDECIDED in (mine.outcome, free.outcome):
+        return None
+    after = f"after {_STARTS[trial.start]}"
+    if _SEVERITY.get(mine.outcome, 0) < _SEVERITY.get(free.outcome, 0):
+        return _beside(trial)
+    if _more(free.swing, mine.swing, _SWING):
+        return f"{after} the bit swings less than without control: {_swing(mine, free)}"
+    if _more(free.stick_fraction, mine.stick_fraction, _STUCK):
+        shares = _percent(mine.stick_fraction, free.stick_fraction)
+        return f"{after} the bit sticks for {shares} of the time"
+    return None
+
+
+def _more(one: float | None, other: float | None, tolerance: float) -> bool:
+    return one is not None and other is not None and one > other + tolerance
+
+
+def _swing(mine: Figures, free: Figures | None = None) -> str:
+    """Return the index of one run, or of one instead of another's."""
+    text = f"swing {mine.swing:.2g}"
+    return text if free is None else f"{text} instead of {free.swing:.2g}"
+
+
+def _percent(mine: float | None, free: float | None) -> str:
+    assert mine is not None
+    assert free is not None
+    return f"{100.0 * mine:.3g} % instead of {100.0 * free:.3g} %"

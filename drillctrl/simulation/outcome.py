@@ -1,0 +1,169 @@
+"""What became of a run, in one word, and the figures that an engineer judges it by."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from drillctrl.simulation.result import Motion, Simulation
+
+SETTLES, ORBIT, STICK_SLIP, BOUNCES = "settles", "orbit", "stick-slip", "bounces"
+LATE, STALLS, TURNS_BACK, DIVERGES = "does-not-keep-up", "stalls", "turns-back", "diverges"
+UNDECIDED = "undecided"
+
+# Rates that stay within this share of their largest range have settled; within the second
+# one too, if they still come together.
+_SETTLED, _SETTLING, _FALLING = 1e-3, 2e-2, 0.7
+# Share of the imposed rate of penetration below which the bit does not keep up.
+_KEEPS_UP = 0.9
+# Multiples of a rig's own scale of speed that no bounded motion of it reaches.
+_BEYOND = 20.0
+_PER_STEP = 5
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What became of a run; of one that broke off only the first and the last are known.
+
+    Attributes
+    ----------
+    outcome : str
+        ``"settles"``: steady drilling, reached or nearly so and still nearing;
+        ``"orbit"``: a bounded motion, periodic or not, without stick and on the rock;
+        ``"bounces"``: the bit leaves the rock; ``"stick-slip"``: it stands still at times;
+        ``"does-not-keep-up"``: it falls behind the feed of the top end; ``"stalls"``: it
+        stands still; ``"turns-back"``, ``"diverges"``; ``"undecided"``: the run ended for a
+        numerical reason and proves nothing. All but the last three are of the last quarter.
+    swing : float or None
+        Stick-slip index, (max − min)/(2 mean) of the bit's speed in the last quarter; None
+        too where the bit stands still.
+    stick_fraction : float or None
+        Share of the last quarter in torsional stick.
+    feed : float or None
+        By how much the deepest place that the bit has been at advances in the last quarter,
+        over the feed of the top end; None too without feed.
+    max_abs_u : float
+        Largest input over the whole run.
+    """
+
+    outcome: str
+    swing: float | None
+    stick_fraction: float | None
+    feed: float | None
+    max_abs_u: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by name."""
+        return asdict(self)
+
+
+def figures(run: Simulation) -> Figures:
+    """Say what became of a run.
+
+    Parameters
+    ----------
+    run : Simulation
+        Any, finished or broken off.
+
+    Notes
+    -----
+    Whether an orbit is periodic or irregular takes more than one run to tell; see
+    `simulation.orbits`.
+    """
+    whole = run.motion
+    largest = float(max(np.abs(whole.axial).max(), np.abs(whole.torque).max()))
+    broken = _broken(run, whole)
+    if broken is not None:
+        return Figures(broken, None, None, None, largest)
+    end = float(run.times[-1])
+    since = 0.75 * end
+    tail = run.on_steps(_PER_STEP, since)
+    speed = run.point.omega0 + tail.dtheta
+    mean = float(np.trapezoid(speed, tail.times)) / (end - since)
+    stuck = sum(max(0.0, b - max(a, since)) for a, b in run.phases("stuck")) / (end - since)
+    swing = float(np.ptp(speed)) / (2.0 * mean) if mean > 1e-9 * run.point.omega0 else None
+    fed = _feed(run, whole, tail)
+    outcome = _bounded(run, tail, stuck, fed)
+    return Figures(outcome, swing, stuck, fed, largest)
+
+
+def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
+    """Whether a rate has gone beyond anything that a bounded motion of the rig reaches.
+
+    The scale is the imposed rate and that with which the string springs back when the steady
+    load on the bit is gone: twist T/Kt at the frequency of torsion, stretch W/Ka at that of
+    the axial motion.
+    """
+    motion = run.motion if motion is None else motion
+    weight, torque = run.steady_load
+    p = run.point
+    axial = p.penetration_rate + weight / p.eta if p.eta > 0.0 else np.inf
+    limits = ((motion.dx, axial), (motion.dtheta, p.omega0 + torque))
+    return any(not float(np.abs(rate).max()) <= _BEYOND * limit for rate, limit in limits)
+
+
+def _broken(run: Simulation, motion: Motion) -> str | None:
+    """Return what became of a run that says nothing of a lasting motion."""
+    if grows_without_bound(run, motion):
+        return DIVERGES
+    if run.status == "reverse rotation":
+        return TURNS_BACK
+    return None if run.status == "done" else UNDECIDED
+
+
+def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> str:
+    """Name a motion that goes on."""
+    if stuck > 0.999:
+        return STALLS
+    if fed is not None and fed < _KEEPS_UP:
+        return LATE
+    if stuck > 0.0:
+        return STICK_SLIP
+    if _settles(run, tail):
+        return SETTLES
+    return ORBIT if bool(tail.contact.all()) else BOUNCES
+
+
+def _settles(run: Simulation, tail: Motion) -> bool:
+    """Whether both rates have come to rest, or nearly so and still do.
+
+    Rates, because positions go on where the drive was changed.
+    """
+    end = float(run.times[-1])
+    third = run.on_steps(3, 0.5 * end)
+    before = third.times < 0.75 * end
+    whole = run.motion
+    for name in ("dx", "dtheta"):
+        now, largest = np.ptp(getattr(tail, name)), np.ptp(getattr(whole, name))
+        if now <= _SETTLED * largest:
+            continue
+        earlier = np.ptp(getattr(third, name)[before]) if before.any() else 0.0
+        if now > _SETTLING * largest or now > _FALLING * earlier:
+            return False
+    return True
+
+
+def _feed(run: Simulation, whole: Motion, tail: Motion) -> float | None:
+    """Return the advance of the hole over that of the top end, in the tail.
+
+    The bit itself goes up and down by more than it advances where it bounces.
+    """
+    times = np.concatenate([whole.times, tail.times])
+    order = np.argsort(times, kind="stable")
+    position = run.point.penetration_rate * times + np.concatenate([whole.x, tail.x])
+    bottom = np.maximum.accumulate(position[order])
+    first = int(np.searchsorted(times[order], tail.times[0]))
+    fed = _top(run, float(times[order][-1])) - _top(run, float(tail.times[0]))
+    return float(bottom[-1] - bottom[first]) / fed if fed > 0.0 else None
+
+
+def _top(run: Simulation, time: float) -> float:
+    """Return how far the top end has been fed."""
+    rows = run.scenario.drive(run.point)
+    start, offset, speed, slope = rows[np.searchsorted(rows[:, 0], time, side="right") - 1][:4]
+    after = time - start
+    beyond = offset + speed * after + 0.5 * slope * after**2
+    return float(run.point.penetration_rate * time + beyond)
