@@ -13,6 +13,7 @@ from drillctrl.cli.gains import read_bounds
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.progress import open_progress
+from drillctrl.cli.roots import trials_option, wants_trials
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ ENDINGS = (".html", ".csv", ".json")
 @click.option("--initial", default="dx=1,dtheta=1", show_default=True, help="Disturbance at t = 0.")
 @click.option("--duration", type=float, default=200.0, show_default=True, help="Of simulations.")
 @click.option("--sort", default="spectral_abscissa", show_default=True, help="Measure to sort by.")
+@trials_option("all")
 @click.option("--no-charts", is_flag=True, help="Leave out the stable areas.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", metavar="FILE", help="Write a report: .html, .csv or .json.")
@@ -47,6 +49,7 @@ def compare_command(
     initial: str,
     duration: float,
     sort: str,
+    trials: str,
     no_charts: bool,
     as_json: bool,
     out: str | None,
@@ -65,6 +68,7 @@ def compare_command(
         raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
     if out is not None and Path(out).suffix.lower() == ".html":
         required("matplotlib", "figures")
+    tried = wants_trials(trials)
     where, names = read_point(point), [name.strip() for name in structures.split(",")]
     candidates = [read_given(text) for text in given]
     from drillctrl.cli.scenario import read_numbers
@@ -80,6 +84,7 @@ def compare_command(
             duration=duration,
             region=None if no_charts else REGION,
             sort=sort,
+            trials=tried,
             progress=progress,
         )
     if out is not None:

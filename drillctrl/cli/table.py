@@ -15,6 +15,7 @@ from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.progress import open_progress
+from drillctrl.cli.roots import trials_option, wants_trials
 from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
     help="Where nothing stabilises: off (no control) or best (best gains found).",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the starting points.")
+@trials_option("all")
 @click.option("--workers", type=int, help="Processes (default 1).")
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Design on a Dask cluster, such as tcp://host:8786."
@@ -66,7 +68,9 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option("--limit", type=float, help="Largest |u| of a .c or .st controller; N·m with a rig.")
 @click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
 @click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
-@click.option("--require-stable", is_flag=True, help="Exit with 3 if a node is not stable.")
+@click.option(
+    "--require-stable", is_flag=True, help="Exit with 3 if a node is not stable or refused."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option(
     "--out",
@@ -116,7 +120,7 @@ def table_command(
     if plot is not None:
         write_figure(plot, result.plot())
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
-    if require_stable and not result.stable.all():
+    if require_stable and not result.sound.all():
         raise click.exceptions.Exit(3)
 
 
@@ -146,6 +150,7 @@ def _design(
         if scheduler is not None:
             raise InputError("workers", workers, "left out with --scheduler, which has its own")
     smooth = checked_number("smooth", options["smooth"], 0.0, 90.0)
+    trials = wants_trials(options["trials"])
     objective = read_objective(options)
     if smooth and not isinstance(objective, Exact):
         raise InputError("smooth", smooth, f"0 with --objective {objective.name}")
@@ -165,6 +170,7 @@ def _design(
             refine=options["refine"],
             fallback=options["fallback"],
             seed=options["seed"],
+            trials=trials,
             executor=executor,
             checkpoint=checkpoint,
             progress=progress,

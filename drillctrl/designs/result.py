@@ -32,6 +32,7 @@ from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.robustness.margins import DelayMargin, ParameterMargin, delay_margin
 from drillctrl.robustness.radius import StabilityRadius, stability_radius
+from drillctrl.simulation.outcome import Figures
 from drillctrl.synthesis.alternative import robust_alternative
 from drillctrl.synthesis.boundary import BoundaryDecision, decide
 from drillctrl.synthesis.certificate import OptimalityCertificate
@@ -141,11 +142,24 @@ class Design:
         """Trial runs with the gains and without control."""
         return self.verdict.trials
 
-    def tried(self) -> Design:
-        """Return the same gains after trial runs on the nonlinear motion."""
-        known = self.case.plant == paper_plant()
-        gains = self.structure, self.K1, self.K2
-        return replace(self, verdict=try_gains(self.point, *gains, self.stable, known_plant=known))
+    def tried(self, uncontrolled: dict[str, Figures] | None = None) -> Design:
+        """Return the same gains after trial runs on the nonlinear motion.
+
+        Parameters
+        ----------
+        uncontrolled : dict, optional
+            What `uncontrolled_runs` returned for the point.
+        """
+        verdict = try_gains(
+            self.point,
+            self.structure,
+            self.K1,
+            self.K2,
+            self.stable,
+            known_plant=self.case.plant == paper_plant(),
+            uncontrolled=uncontrolled,
+        )
+        return replace(self, verdict=verdict)
 
     @functools.cached_property
     def modes_worse(self) -> tuple[ModeShift, ...]:

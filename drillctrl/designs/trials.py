@@ -8,17 +8,27 @@ from typing import Any
 
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.outcome import SETTLES, Figures, figures, grows_without_bound
+from drillctrl.simulation.outcome import (
+    DIVERGES,
+    SETTLES,
+    TURNS_BACK,
+    UNDECIDED,
+    Figures,
+    figures,
+    grows_without_bound,
+)
+from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 
 # How long a run is: this many times the decay time of the torsional mode's own damping, of
 # which the bit takes half or more away, so that what a start has left is below the swing
 # that is compared; within the limits, where there is little damping or a lot.
 _DECAYS, _SHORTEST, _LONGEST = 15.0, 150.0, 400.0
-# A motion that grows turns ever faster, and each turn takes steps: it is found in a run of
-# few steps before a longer one is made.
-_FEW, _MANY = 8_000, 300_000
-_RTOL = 1e-7
+# Where a run breaks off for a numerical reason it is made again with the smaller tolerance.
+_RTOL, _FINER = 1e-7, 1e-9
+# A motion that grows takes ever more steps: it is looked for after those that usual motions
+# need, before more are made.
+_FEW, _MANY = 20_000, 60_000
 
 
 @dataclass(frozen=True)
@@ -81,18 +91,27 @@ def trial_duration(point: OperatingPoint) -> float:
 
 def trial_run(point: OperatingPoint, controller: Controller | None, start: Start) -> Figures:
     """Return what becomes of one start, with control or without."""
+    found = figures(_run(point, controller, start, _RTOL))
+    if found.outcome == UNDECIDED:
+        found = figures(_run(point, controller, start, _FINER))
+    return found
+
+
+def _run(
+    point: OperatingPoint, controller: Controller | None, start: Start, rtol: float
+) -> Simulation:
     for most in (_FEW, _MANY):
         run = simulate(
             point,
             controller,
             duration=trial_duration(point),
             initial=start.initial(point),
-            rtol=_RTOL,
+            rtol=rtol,
             max_steps=most,
         )
         if run.status != "step limit" or grows_without_bound(run):
             break
-    return figures(run)
+    return run
 
 
 def uncontrolled_runs(point: OperatingPoint) -> dict[str, Figures]:
@@ -132,12 +151,13 @@ def _trials(
 ) -> Iterable[Trial]:
     for start in STARTS:
         mine = trial_run(point, controller, start)
+        harm = mine.outcome in (TURNS_BACK, DIVERGES)
         if uncontrolled is not None:
             free = uncontrolled[start.name]
-        elif spare and (mine.outcome == SETTLES or mine.swing is None):
+        elif spare and (harm or mine.outcome == SETTLES):
             free = None
         else:
             free = trial_run(point, None, start)
         yield Trial(start.name, mine, free)
-        if spare and mine.swing is None:
+        if spare and harm:
             return

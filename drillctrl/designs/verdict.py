@@ -83,6 +83,7 @@ def try_gains(
     stable: bool,
     *,
     known_plant: bool = True,
+    uncontrolled: dict[str, Figures] | None = None,
     spare: bool = False,
 ) -> Verdict:
     """Try gains on the nonlinear motion, and judge them.
@@ -97,7 +98,7 @@ def try_gains(
         Whether the linear loop is.
     known_plant : bool
         Whether the simulator's physics are those of the plant.
-    spare : bool
+    uncontrolled, spare
         As in `trial_runs`.
     """
     if structure is None:
@@ -108,7 +109,7 @@ def try_gains(
         controller = Controller(structure, K1, K2)
     except InputError as error:
         return Verdict(None, f"{LEFT_OUT}: the simulator cannot close this loop ({error})")
-    trials = trial_runs(point, controller, spare=spare)
+    trials = trial_runs(point, controller, uncontrolled=uncontrolled, spare=spare)
     return judge(trials, stable)
 
 
@@ -162,8 +163,8 @@ def _harm(trial: Trial) -> str | None:
     if mine.outcome in (TURNS_BACK, DIVERGES):
         return _beside(trial)
     if free is None:
-        # Left out where nothing can be worse than without control, or all is said already.
-        return None if mine.outcome == SETTLES else _beside(trial)
+        # Left out where the motion settles: nothing can be better without control.
+        return None
     if ends > _SEVERITY.get(free.outcome, 0):
         return _beside(trial)
     if mine.outcome == UNDECIDED and free.outcome != UNDECIDED:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from drillctrl.simulation.result import Motion, Simulation
 
+FloatArray = npt.NDArray[np.float64]
 SETTLES, ORBIT, STICK_SLIP, BOUNCES = "settles", "orbit", "stick-slip", "bounces"
 LATE, STALLS, TURNS_BACK, DIVERGES = "does-not-keep-up", "stalls", "turns-back", "diverges"
 UNDECIDED = "undecided"
@@ -20,7 +23,7 @@ _SETTLED, _SETTLING, _FALLING = 1e-3, 2e-2, 0.7
 # Share of the imposed rate of penetration below which the bit does not keep up.
 _KEEPS_UP = 0.9
 # Multiples of a rig's own scale of speed that no bounded motion of it reaches.
-_BEYOND = 20.0
+_BEYOND, _LARGE = 20.0, 3.0
 _PER_STEP = 5
 
 
@@ -95,14 +98,28 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
 
     The scale is the imposed rate and that with which the string springs back when the steady
     load on the bit is gone: twist T/Kt at the frequency of torsion, stretch W/Ka at that of
-    the axial motion.
+    the axial motion. Beyond a few times that, a run that broke off at its step limit grew if
+    its amplitude did from each quarter to the next.
     """
     motion = run.motion if motion is None else motion
     weight, torque = run.steady_load
     p = run.point
     axial = p.penetration_rate + weight / p.eta if p.eta > 0.0 else np.inf
-    limits = ((motion.dx, axial), (motion.dtheta, p.omega0 + torque))
-    return any(not float(np.abs(rate).max()) <= _BEYOND * limit for rate, limit in limits)
+    for rate, limit in ((motion.dx, axial), (motion.dtheta, p.omega0 + torque)):
+        sizes = [float(np.abs(rate[part]).max(initial=0.0)) for part in _quarters(motion.times)]
+        if not max(sizes) <= _BEYOND * limit:
+            return True
+        rising = all(a < b for a, b in itertools.pairwise(sizes)) and sizes[-1] > 2.0 * sizes[0]
+        if run.status == "step limit" and rising and sizes[-1] > _LARGE * limit:
+            return True
+    return False
+
+
+def _quarters(times: FloatArray) -> list[slice]:
+    """Return the four quarters of a run as slices of its instants."""
+    edges = np.searchsorted(times, np.linspace(0.0, float(times[-1]), 5))
+    edges[-1] = times.size
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _broken(run: Simulation, motion: Motion) -> str | None:

@@ -13,9 +13,11 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.result import Design
+from drillctrl.designs.trials import uncontrolled_runs
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import as_structure
 from drillctrl.robustness.loop_margins import LoopMargins, loop_margins
+from drillctrl.simulation.outcome import Figures
 from drillctrl.studies.comparison import OPEN_LOOP, SORTS, Comparison, Row
 from drillctrl.studies.comparison_text import delay_room
 from drillctrl.studies.measures import basin, respond
@@ -35,10 +37,21 @@ def _subjects(
     structures: Sequence[str | FeedbackStructure],
     given: Sequence[Given],
     bounds: Mapping[str, tuple[float, float]] | None,
+    trials: bool | None,
     tell: Callable[[str], None],
 ) -> list[tuple[str, Design, bool]]:
-    """Design and analyse the candidates, the open loop first."""
-    subjects = [(OPEN_LOOP, analyze(point), False)]
+    """Design, analyse and try the candidates, the open loop first."""
+    open_loop = analyze(point)
+    subjects = [(OPEN_LOOP, open_loop, False)]
+    free: dict[str, Figures] | None = None
+
+    def tried(candidate: Design) -> Design:
+        nonlocal free
+        if not trials or candidate.point is None:
+            return candidate
+        free = uncontrolled_runs(candidate.point) if free is None else free
+        return candidate.tried(free)
+
     designed = [as_structure(s) for s in structures]
     known = dict.fromkeys(name for chosen in designed for name in chosen.entry_names)
     for name in bounds or {}:
@@ -51,10 +64,12 @@ def _subjects(
             for name, limits in (bounds or {}).items()
             if name in ("K1", "K2") or name in chosen.entry_names
         }
-        subjects.append((chosen.name, design(point, chosen, bounds=mine), True))
+        subjects.append(
+            (chosen.name, tried(design(point, chosen, bounds=mine, trials=False)), True)
+        )
     for label, structure, K1, K2 in given:
         tell(f"analysis of {label}")
-        subjects.append((label, analyze(point, structure, K1, K2), False))
+        subjects.append((label, tried(analyze(point, structure, K1, K2)), False))
     labels = [label for label, _, _ in subjects]
     if len(set(labels)) < len(labels):
         raise InputError("structures", labels[1:], f"different names, none of them {OPEN_LOOP}")
@@ -71,6 +86,7 @@ def compare(
     duration: float = 200.0,
     region: tuple[tuple[str, float, float], tuple[str, float, float]] | None = REGION,
     sort: str = "spectral_abscissa",
+    trials: bool | None = True,
     progress: Progress | None = None,
 ) -> Comparison:
     """Compare feedback structures, and given gains, at an operating point.
@@ -94,6 +110,8 @@ def compare(
         Axes of the charts of each candidate's gains; None draws none.
     sort : str
         A key of `SORTS`.
+    trials : bool, optional
+        Whether the gains are tried on the nonlinear motion, as by `design`.
     progress : callable, optional
         Called with what is being done, steps done and steps in all.
 
@@ -124,7 +142,7 @@ def compare(
 
     rows: list[Row] = []
     area = None
-    for label, subject, designed in _subjects(point, structures, given, bounds, tell):
+    for label, subject, designed in _subjects(point, structures, given, bounds, trials, tell):
         tell(f"measures of {label}")
         chart = _chart(point, subject, region)
         if label == OPEN_LOOP and chart is not None:

@@ -57,6 +57,8 @@ CSV_COLUMNS = (
     "formation_change",
     "stable_area",
     "area_ratio",
+    "recommended",
+    "reason",
 )
 
 
@@ -153,6 +155,8 @@ class Row:
             "formation_change": self.formation_change,
             "stable_area": None if self.chart is None else self.chart.stable_area,
             "area_ratio": self.area_ratio,
+            "recommended": design.recommended,
+            "reason": None if design.structure is None else design.reason,
         }
 
 

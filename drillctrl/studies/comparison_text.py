@@ -24,6 +24,7 @@ COLUMNS = (
     ("Δψ", "formation_change", "{:.0%}"),
     ("area", "stable_area", "{:.4g}"),
     ("ratio", "area_ratio", "{:.3g}"),
+    ("trials", "recommended", "{}"),
 )
 LEGEND = (
     "α: spectral abscissa; radius: relative error of the plant's matrices that destabilises; "
@@ -32,7 +33,8 @@ LEGEND = (
     "of the nonlinear motion, or the period T of the orbit that it ends in; stick: its share of "
     "torsional stick at the end; basin: multiple of the disturbance that still settles (up to "
     "16); Δψ: relative change of the rock's strength that destabilises; area, ratio: where these "
-    "gains are stable, and against no control. "
+    "gains are stable, and against no control; trials: what runs from three starts beside no "
+    "control say of the gains. "
     "–: does not exist or does not settle."
 )
 
@@ -46,6 +48,8 @@ def cells(fields: Fields) -> list[str]:
             found.append(f"T {fields['period']:.4g}")
         elif value is None:
             found.append("–")
+        elif name == "recommended":
+            found.append("good" if value else "REFUSED")
         elif name == "delay_margin":
             longer = "any" if value["longer"] is None else f"{value['longer']:.3g}"
             found.append(f"{value['shorter']:.3g}-{longer}")
@@ -98,11 +102,17 @@ def sentences(rows: Sequence[Fields]) -> list[str]:
     fed = [row for row in rows if row["structure"] is not None]
     if not fed:
         return []
-    best, *others = fed
+    told = [
+        f"{row['label']} is REFUSED: {row['reason']}." for row in fed if row["recommended"] is False
+    ]
+    offered = [row for row in fed if row["recommended"] is not False]
+    if not offered:
+        return [*told, "None of these gains is offered."]
+    best, *others = offered
     if not best["stable"]:
         text = "None of these gains stabilises this point"
-        return [f"{text}; the summary of a design says what would."]
-    found = []
+        return [*told, f"{text}; the summary of a design says what would."]
+    found = told
     for other in others:
         if not other["stable"]:
             found.append(f"{best['label']} stabilises the point, {other['label']} does not.")

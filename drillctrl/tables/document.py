@@ -86,6 +86,8 @@ def to_document(table: GainTable) -> Document:
         "fallback": table.fallback,
         "seed": table.seed,
         "objective": table.objective,
+        "tried": table.tried,
+        "refused": {str(node): reason for node, reason in sorted(table.refusals.items())},
         "cells": {
             "modes": list(CELL_NAMES),
             "mode": table.cells.mode.tolist(),
@@ -194,6 +196,8 @@ def from_document(document: Document) -> GainTable:
         checked_integer("seed", header["seed"], 0, 2**63 - 1),
         _read_cells(header["cells"], math.prod(cell_shape(grid)), structure),
         _words("objective", header["objective"]),
+        bool(header["tried"]),
+        _read_refusals(header["refused"], rows),
     )
     _check_consistency(table, document)
     return table
@@ -203,6 +207,13 @@ def _words(name: str, value: Any) -> str:
     if not (isinstance(value, str) and len(value) <= _LONGEST_WORDS and value.isprintable()):
         raise ValueError(f"{name} {str(value)[:60]!r}")
     return value
+
+
+def _read_refusals(given: dict[str, Any], rows: int) -> dict[int, str]:
+    found = {int(node): _words("a reason", reason) for node, reason in given.items()}
+    if not all(0 <= node < rows for node in found):
+        raise ValueError("a refusal at a node that is not there")
+    return found
 
 
 def _read_structure(layout: dict[str, Any]) -> FeedbackStructure:
@@ -263,5 +274,5 @@ def _check_consistency(table: GainTable, document: Document) -> None:
     vouched = table.cells.mode != UNSAFE
     if (table.cells.spectral_abscissa[vouched] >= 0.0).any():
         raise ValueError("a cell that is vouched for with a positive spectral abscissa")
-    if not table.stable[corners_of(table.grid)[vouched]].all():
-        raise ValueError("a cell that is vouched for with a node that is not stable")
+    if not table.sound[corners_of(table.grid)[vouched]].all():
+        raise ValueError("a cell that is vouched for with a node that is not")

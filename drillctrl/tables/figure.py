@@ -48,7 +48,7 @@ class Drawn(NamedTuple):
     entries : array, (q, 2 m p)
         All entries of K1, then K2, at each node.
     spectral_abscissa, stable : array, (q,)
-        α at each node, and whether it is stable.
+        α at each node, and whether it is vouched for: stable, and not refused.
     cells : Cells
         What is known between the nodes.
     constant : array, (c, 2 m p)
@@ -83,7 +83,7 @@ def plot_table(table: Drawn) -> Figure:
         ax.set_title(title)
     for ax in axes[len(panels) :]:
         ax.set_axis_off()
-    marks = "× not stable, //// not vouched for, · constant gains"
+    marks = "× not stable or refused, //// not vouched for, · constant gains"
     figure.suptitle(f"{table.structure.name}, {', '.join([*held, marks])}", fontsize="medium")
     return figure
 
@@ -148,7 +148,7 @@ def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
     for kind, hatch in ((UNSAFE, "////"), (CONSTANT, "..")):
         for i in np.flatnonzero(table.cells.mode == kind).tolist():
             ax.axvspan(x[i], x[i + 1], fill=False, hatch=hatch, linewidth=0.0, alpha=0.4)
-    ax.scatter(x[~table.stable], values[~table.stable], marker="x", c="black", zorder=3)
+    ax.scatter(x[~table.stable], values[~table.sound], marker="x", c="black", zorder=3)
     ax.set_xlabel(axis_label(axis))
 
 

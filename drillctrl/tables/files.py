@@ -21,7 +21,7 @@ from drillctrl.tables.table import GainTable
 
 # Beyond this no table of at most a million nodes is meant.
 MAX_BYTES = 1_000_000_000
-_WHOLE = ("stable", "certified")
+_WHOLE = ("stable", "certified", "refused")
 # Of a little-endian MATLAB 5 file: its version, and the types of its elements.
 _MAT_VERSION = b"\x00\x01IM"
 _MAT_MATRIX, _MAT_DOUBLES, _MAT_UTF8 = 14, 9, 16

@@ -14,6 +14,7 @@ from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
 from drillctrl.designs.loop_analysis import analyze_loop
+from drillctrl.designs.verdict import try_gains
 from drillctrl.drilling.case import plant_system
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.synthesis.certificate import certify_optimality
@@ -54,6 +55,8 @@ class NodeTask:
         Of the starting points.
     known : tuple of array, (k,)
         Gains of neighbours; without any the whole box is searched.
+    trials : bool
+        Whether gains are tried on the nonlinear motion when they are checked.
     active : tuple of tuple of ActiveRoot
         The active roots there, as many as ``known`` or none; each may be empty.
     objective : Objective
@@ -66,6 +69,7 @@ class NodeTask:
     seed: int
     known: tuple[FloatArray, ...] = ()
     objective: Objective = EXACT
+    trials: bool = False
     active: tuple[tuple[ActiveRoot, ...], ...] = ()
 
 
@@ -164,19 +168,30 @@ def _design_otherwise(task: NodeTask) -> NodeDesign:
 
 @dataclass(frozen=True)
 class NodeCheck:
-    """Independent answer on the loop at a node: roots, and their count."""
+    """Independent answer on the loop at a node: roots, their count, and trial runs.
+
+    Where ``refusal`` says why trial runs refused the gains, the rest is of no control.
+    """
 
     index: int
     spectral_abscissa: float
     abscissa_error: float
     stable: bool
     certified: bool
+    refusal: str | None = None
 
 
 def check_node(task: NodeTask) -> NodeCheck:
-    """Analyse the loop that the first known gains close at a node."""
-    family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
-    loop = analyze_loop(family.loop(task.known[0]))
+    """Analyse the loop that the first known gains close at a node, and try them if asked."""
+    structure, gains = task.structure, task.known[0]
+    family = loop_family(plant_system(task.point, structure.inputs), structure)
+    loop = analyze_loop(family.loop(gains))
+    off = no_control(structure)
+    refusal = None
+    if task.trials and (gains != off).any():
+        verdict = try_gains(task.point, structure, *structure.gains(gains), loop.stable, spare=True)
+        if verdict.refused:
+            refusal, loop = verdict.reason, analyze_loop(family.loop(off))
     return NodeCheck(
         task.index,
         loop.spectral_abscissa,
@@ -184,7 +199,13 @@ def check_node(task: NodeTask) -> NodeCheck:
         float(np.nan_to_num(loop.abscissa_error, nan=_UNKNOWN, posinf=_UNKNOWN)),
         loop.stable,
         loop.certificate.agrees,
+        refusal,
     )
+
+
+def no_control(structure: FeedbackStructure) -> FloatArray:
+    """Return the gain vector that is nearest to no control within the bounds, (k,)."""
+    return np.asarray(np.clip(0.0, structure.lower, structure.upper))
 
 
 def find_design(checkpoint: Checkpoint, task: NodeTask) -> NodeDesign | None:

@@ -167,6 +167,7 @@ def sampled_controller(
         f"switched on over {count} samples",
         "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
         "bounds": ", ".join(f"{entry} {low:g}..{high:g}" for entry, low, high in bounds),
+        "trials": trial_words(table),
         "checksum": to_document(table).header["checksum"],
         "outputs": str(len(structure.outputs)),
         "depth": str(depth),
@@ -182,3 +183,12 @@ def sampled_controller(
         words,
         tuple(textwrap.wrap(f"{'Groups' if rig is None else 'Rig (SI)'}: {text}", 80)),
     )
+
+
+def trial_words(table: GainTable) -> str:
+    """Say what trial runs on the nonlinear motion vouch for."""
+    if not table.tried:
+        return "NONE: these gains have not been tried on the nonlinear motion"
+    refused = len(table.refusals)
+    text = f"gains of all {len(table.gains)} nodes tried on the nonlinear motion"
+    return f"{text}; {refused} refused, control is off there" if refused else text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -22,7 +22,14 @@ from drillctrl.tables.cells import cell_tasks, check_cells, joined
 from drillctrl.tables.continuation import design_grid
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CELL_NAMES, UNSAFE, BoolArray, Cells, interpolated, place
-from drillctrl.tables.node import NodeDesign, NodeTask, check_node, find_design, keep_design
+from drillctrl.tables.node import (
+    NodeDesign,
+    NodeTask,
+    check_node,
+    find_design,
+    keep_design,
+    no_control,
+)
 from drillctrl.tables.refinement import carried_over, refined_grid
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
 
@@ -30,6 +37,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FALLBACKS = ("off", "best")
+# Refused nodes of which a summary tells the reason.
+_SHOWN = 3
 ABSCISSA_ERROR = "spectral_abscissa_error"
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -65,6 +74,11 @@ class GainTable:
         What is known between the nodes.
     objective : str
         What was minimised at each node.
+    tried : bool
+        Whether the gains were tried on the nonlinear motion.
+    refusals : mapping of int to str
+        For nodes whose gains the trials refused, why. No control stands there instead, and
+        the table vouches for no cell beside them.
     """
 
     grid: Grid
@@ -80,6 +94,18 @@ class GainTable:
     seed: int
     cells: Cells
     objective: str = repr(EXACT)
+    tried: bool = False
+    refusals: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def refused(self) -> BoolArray:
+        """Nodes whose gains the trials refused, (q,)."""
+        return np.isin(np.arange(len(self.gains)), list(self.refusals))
+
+    @property
+    def sound(self) -> BoolArray:
+        """Nodes that are stable with gains that were not refused, (q,)."""
+        return np.asarray(self.stable & ~self.refused)
 
     @property
     def entries(self) -> FloatArray:
@@ -93,7 +119,7 @@ class GainTable:
     @property
     def jump(self) -> tuple[float, tuple[int, int] | None]:
         """Largest change between neighbouring stable nodes or cells; see `largest_jump`."""
-        return largest_jump(self.grid, self.structure, self.gains, self.stable, self.cells)
+        return largest_jump(self.grid, self.structure, self.gains, self.sound, self.cells)
 
     def gains_at(
         self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
@@ -140,6 +166,8 @@ class GainTable:
             "stable_nodes": int(self.stable.sum()),
             "certified_nodes": int(self.certified.sum()),
             "fallback": self.fallback,
+            "tried": self.tried,
+            "refused_nodes": len(self.refusals),
             "give_up": self.give_up,
             "largest_jump": jump,
             "largest_jump_between": None
@@ -149,14 +177,18 @@ class GainTable:
                 name: int((self.cells.mode == mode).sum()) for mode, name in enumerate(CELL_NAMES)
             },
             "worst_abscissa": self.worst_abscissa,
-            "rows": [dict(zip(self.columns, row, strict=True)) for row in self.rows()],
+            "rows": [
+                {**dict(zip(self.columns, row, strict=True)), "reason": self.refusals.get(i)}
+                for i, row in enumerate(self.rows())
+            ],
         }
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the first columns of a row, the same in every file."""
         names = ("omega0", "delta0", "psi", *self.structure.entry_names)
-        return (*names, "spectral_abscissa", "stable", "certified", "best_abscissa", ABSCISSA_ERROR)
+        known = ("spectral_abscissa", "stable", "certified", "best_abscissa", ABSCISSA_ERROR)
+        return (*names, *known, "refused")
 
     def rows(self) -> list[list[float | bool]]:
         """Return one row a node in the order of `columns`."""
@@ -170,6 +202,7 @@ class GainTable:
                 self.certified.tolist(),
                 self.best_abscissa.tolist(),
                 self.abscissa_error.tolist(),
+                self.refused.tolist(),
                 strict=True,
             )
         ]
@@ -194,12 +227,13 @@ class GainTable:
             f"  Nodes         {int(self.stable.sum())} stable, "
             f"{int(self.certified.sum())} with the root count agreeing",
         ]
-        unstable = int((~self.stable).sum())
+        unstable = int((~self.stable & ~self.refused).sum())
         if unstable:
             stated = "control off" if self.fallback == "off" else "the best gains found, unstable"
             lines.append(f"                {unstable} that nothing found stabilises: {stated}")
-        if self.stable.any():
-            alpha = self.spectral_abscissa[self.stable]
+        lines += self._trial_lines()
+        if self.sound.any():
+            alpha = self.spectral_abscissa[self.sound]
             lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} where stable")
         if between is not None:
             ends = self.grid.coordinates[list(between)].T.tolist()
@@ -220,6 +254,20 @@ class GainTable:
             lines.append(f"                worst α found where vouched for: {worst}")
         return "\n".join(lines)
 
+    def _trial_lines(self) -> list[str]:
+        """Say what trial runs showed, and why gains were refused."""
+        if not self.tried:
+            return ["                gains not tried on the nonlinear motion"]
+        if not self.refusals:
+            return ["                no gains refused by trial runs on the nonlinear motion"]
+        lines = [f"                {len(self.refusals)} REFUSED by trial runs: control off"]
+        for node, reason in list(self.refusals.items())[:_SHOWN]:
+            place = zip(self.grid.axes, self.grid.coordinates[node].tolist(), strict=True)
+            where = ", ".join(a.text(value) for a, value in place if len(a.values) > 1)
+            lines.append(f"                  {where or 'here'}: {reason}")
+        hidden = len(self.refusals) - _SHOWN
+        return [*lines, f"                  and {hidden} more"] if hidden > 0 else lines
+
     def plot(self) -> Figure:
         """Draw gains and α over the grid; see `drillctrl.tables.figure.plot_table`."""
         from drillctrl.tables.figure import Drawn, plot_table
@@ -230,7 +278,7 @@ class GainTable:
                 self.structure,
                 self.entries,
                 self.spectral_abscissa,
-                self.stable,
+                self.sound,
                 self.cells,
                 self.entries_of(self.cells.gains),
             )
@@ -251,6 +299,7 @@ def table(
     refine: int = 0,
     fallback: str = "off",
     seed: int = 0,
+    trials: bool | None = True,
     executor: Executor | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
@@ -278,6 +327,9 @@ def table(
         the best gains found. It is marked as not stable either way.
     seed : int
         Of the searches; the same seed gives the same table.
+    trials : bool, optional
+        Whether gains are tried on the nonlinear motion, as by `design`. A node whose gains
+        are refused gets no control, whatever the fallback.
     executor : concurrent.futures.Executor, optional
         Designs the nodes side by side; without it this process does, one after another. The
         table does not depend on it.
@@ -330,11 +382,17 @@ def table(
         with threadpool_limits(1, user_api="blas"):
             gains = smooth_gains(grid, chosen, gains, best, share)
         if fallback == "off":
-            gains = np.where((best < 0.0)[:, None], gains, np.clip(0.0, chosen.lower, chosen.upper))
-        tasks = [NodeTask(i, p, chosen, seed, (gains[i],)) for i, p in enumerate(grid.points)]
+            gains = np.where((best < 0.0)[:, None], gains, no_control(chosen))
+        tasks = [
+            NodeTask(i, p, chosen, seed, (gains[i],), trials=bool(trials))
+            for i, p in enumerate(grid.points)
+        ]
         checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
+        refusals = {check.index: check.refusal for check in checks if check.refusal is not None}
+        gains[list(refusals)] = no_control(chosen)
         stable = np.array([check.stable for check in checks])
-        cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, stable)))
+        sound = stable & np.array([check.refusal is None for check in checks])
+        cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, sound)))
         result = GainTable(
             grid,
             chosen,
@@ -349,8 +407,10 @@ def table(
             seed,
             cells,
             repr(objective),
+            bool(trials),
+            refusals,
         )
-        finer = refined_grid(grid, cells, stable)
+        finer = refined_grid(grid, cells, sound)
         if finer == grid:
             break
         grid, known = finer, carried_over(designs, grid, finer)
