@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.delay.structure import FeedbackStructure, close_loop
+from drillctrl.base.arrays import FloatArray
+from drillctrl.delay.closing import close_loop
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.characteristic import FloatArray
 from drillctrl.spectrum.roots import dominant_roots
 
 _SCALES = 64

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.trials import Trial, trial_runs
@@ -22,7 +23,6 @@ from drillctrl.simulation.outcome import (
     UNDECIDED,
     Figures,
 )
-from drillctrl.spectrum.characteristic import FloatArray
 
 # Differences between two runs below which they are alike: irregular motions repeat their
 # figures no better.

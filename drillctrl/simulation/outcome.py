@@ -7,12 +7,13 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
+
+from drillctrl.base.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from drillctrl.simulation.result import Motion, Simulation
+    from drillctrl.simulation.result import Simulation
+    from drillctrl.simulation.trace import Motion
 
-FloatArray = npt.NDArray[np.float64]
 SETTLES, ORBIT, STICK_SLIP, BOUNCES = "settles", "orbit", "stick-slip", "bounces"
 LATE, STALLS, TURNS_BACK, DIVERGES = "does-not-keep-up", "stalls", "turns-back", "diverges"
 UNDECIDED = "undecided"

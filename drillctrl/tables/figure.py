@@ -148,7 +148,7 @@ def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
     for kind, hatch in ((UNSAFE, "////"), (CONSTANT, "..")):
         for i in np.flatnonzero(table.cells.mode == kind).tolist():
             ax.axvspan(x[i], x[i + 1], fill=False, hatch=hatch, linewidth=0.0, alpha=0.4)
-    ax.scatter(x[~table.stable], values[~table.sound], marker="x", c="black", zorder=3)
+    ax.scatter(x[~table.stable], values[~table.stable], marker="x", c="black", zorder=3)
     ax.set_xlabel(axis_label(axis))
 
 
