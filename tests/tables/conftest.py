@@ -10,7 +10,7 @@ from drillctrl.base.units import ROTARY_SPEED, SPEED, to_si
 def small():
     """3 × 3 nodes of case1, all of which can be made stable."""
     grid = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
-    return table(grid, "case1")
+    return table(grid, "case1", trials=False)
 
 
 @pytest.fixture(scope="session")
@@ -23,4 +23,4 @@ def on_rig():
         linear_axis("rotary_speed", *speeds, 3),
         penetration_rate=linear_axis("penetration_rate", *rates, 2),
     )
-    return table(grid, "case2")
+    return table(grid, "case2", trials=False)

@@ -25,14 +25,16 @@ def same(one, other):
 def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
     path = tmp_path / "half.checkpoint"
     first = Checkpoint(path)
-    assert same(table(GRID, "case1", checkpoint=first), small)
+    assert same(table(GRID, "case1", trials=False, checkpoint=first), small)
     first.close()
     lines = path.read_bytes().splitlines(keepends=True)
     # What a kill leaves: some lines, and one cut short.
     path.write_bytes(b"".join(lines[:4]) + lines[4][:37])
     seen = []
     second = Checkpoint(path)
-    again = table(GRID, "case1", checkpoint=second, progress=lambda *a: seen.append(a))
+    again = table(
+        GRID, "case1", trials=False, checkpoint=second, progress=lambda *a: seen.append(a)
+    )
     second.close()
     assert same(again, small)
     # The first line is the header.
@@ -41,12 +43,14 @@ def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
     # Another seed is another task.
     third = Checkpoint(path)
     fresh = []
-    table(GRID, "case1", seed=1, checkpoint=third, progress=lambda *a: fresh.append(a))
+    table(
+        GRID, "case1", trials=False, seed=1, checkpoint=third, progress=lambda *a: fresh.append(a)
+    )
     assert sum(stage == "design" for stage, _, _ in fresh) >= 9
     # What is done is taken out; the file goes with the last of it.
     assert third.remove() == len(lines) - 1
     fourth = Checkpoint(path)
-    assert same(table(GRID, "case1", checkpoint=fourth), small)
+    assert same(table(GRID, "case1", trials=False, checkpoint=fourth), small)
     assert fourth.remove() == 0
     assert not path.exists()
 
@@ -112,7 +116,13 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
                 killed.append(processes[0])
                 os.kill(processes[0], signal.SIGKILL)
 
-        found = table(GRID, "case1", executor=client.get_executor(pure=False), progress=kill_once)
+        found = table(
+            GRID,
+            "case1",
+            trials=False,
+            executor=client.get_executor(pure=False),
+            progress=kill_once,
+        )
     assert killed
     assert same(found, small)
 
@@ -178,7 +188,7 @@ def test_the_result_does_not_depend_on_the_order_of_nodes(small):
             future.set_result(list(reversed(work(*arguments))))
             return future
 
-    assert same(table(GRID, "case1", executor=Backwards()), small)
+    assert same(table(GRID, "case1", trials=False, executor=Backwards()), small)
     assert np.isfinite(small.gains).all()
 
 

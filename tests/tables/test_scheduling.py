@@ -30,6 +30,7 @@ def rocks():
     return table(
         dimensionless_grid(10.0, linear_axis("delta0", 1, 3, 2), linear_axis("psi", 12, 24, 3)),
         "case1",
+        trials=False,
     )
 
 
@@ -69,7 +70,9 @@ def test_a_controller_that_learns_late_switches_late(rocks):
 @pytest.fixture(scope="module")
 def speeds():
     """Gains over the rotary speed."""
-    return table(dimensionless_grid(linear_axis("omega0", 6, 12, 5), 1.0, 14.0), "case2")
+    return table(
+        dimensionless_grid(linear_axis("omega0", 6, 12, 5), 1.0, 14.0), "case2", trials=False
+    )
 
 
 @pytest.mark.parametrize(("before", "after"), [(6.0, 12.0), (12.0, 6.0)])

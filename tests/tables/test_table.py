@@ -57,7 +57,7 @@ def test_interpolation_is_bilinear_and_clamped(small):
 
 
 def test_smoothing_keeps_its_promise(small):
-    smooth = table(small.grid, "case1", give_up=0.1)
+    smooth = table(small.grid, "case1", trials=False, give_up=0.1)
     assert smooth.jump[0] < small.jump[0]
     assert (smooth.spectral_abscissa <= 0.9 * smooth.best_abscissa + 1e-6).all()
     assert (np.abs(smooth.gains) <= 10.0).all()
@@ -94,13 +94,13 @@ def test_a_worker_more_changes_nothing(small):
     from concurrent.futures import ProcessPoolExecutor
 
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        again = table(small.grid, "case1", executor=pool)
+        again = table(small.grid, "case1", trials=False, executor=pool)
     assert np.array_equal(again.gains, small.gains)
     assert np.array_equal(again.cells.spectral_abscissa, small.cells.spectral_abscissa)
 
 
 def test_one_node_and_three_axes():
-    single = table(dimensionless_grid(10.0, 1.75, 14.0), "p")
+    single = table(dimensionless_grid(10.0, 1.75, 14.0), "p", trials=False)
     assert single.jump == (0.0, None)
     assert (
         single.spectral_abscissa[0] == design(OperatingPoint(10, 1.75, 14), "p").spectral_abscissa
@@ -110,6 +110,7 @@ def test_one_node_and_three_axes():
             Axis("omega0", (9.0, 10.0)), Axis("delta0", (1.0, 2.0)), Axis("psi", (14.0, 18.0))
         ),
         "p",
+        trials=False,
     )
     corners = list(itertools.product((9.0, 10.0), (1.0, 2.0), (14.0, 18.0)))
     assert [(p.omega0, p.delta0, p.psi) for p in cube.grid.points] == corners
@@ -128,7 +129,7 @@ def test_bad_axes(low, high, count):
 def test_bad_arguments(small):
     for wrong in ({"give_up": 0.95}, {"fallback": "nearest"}, {"seed": -1}, {"refine": 7}):
         with pytest.raises(InputError):
-            table(small.grid, "case1", **wrong)
+            table(small.grid, "case1", trials=False, **wrong)
 
 
 def test_figure_shows_gains_and_abscissa(on_rig):
@@ -155,7 +156,7 @@ def test_one_axis_is_drawn_as_lines_and_one_node_as_text(speeds):
     # A constant gain is drawn over its cell, beside the ones that are interpolated.
     middle = figure.axes[0].lines[2].get_data()[1]
     assert middle.tolist() == [speeds.cells.gains[1, 0]] * 2
-    titles, figure = titles_of(table(dimensionless_grid(10.0, 1.75, 14.0), "p"))
+    titles, figure = titles_of(table(dimensionless_grid(10.0, 1.75, 14.0), "p", trials=False))
     assert titles == ["one node"]
     assert "K1_1 = " in figure.axes[0].texts[0].get_text()
 
@@ -163,7 +164,10 @@ def test_one_axis_is_drawn_as_lines_and_one_node_as_text(speeds):
 def test_all_layers_of_three_axes_are_drawn_and_a_constant_gain_too():
     axes = Axis("omega0", (3.0, 9.0, 10.0)), Axis("delta0", (1.0, 2.0, 3.0))
     cube = table(
-        dimensionless_grid(*axes, Axis("psi", (14.0, 18.0))), "p", bounds={"K1_1": (-9.0, -8.9)}
+        dimensionless_grid(*axes, Axis("psi", (14.0, 18.0))),
+        "p",
+        bounds={"K1_1": (-9.0, -8.9)},
+        trials=False,
     )
     cube = replace(cube, gains=np.full_like(cube.gains, -9.0))
     titles, figure = titles_of(cube)
@@ -177,7 +181,9 @@ def test_all_layers_of_three_axes_are_drawn_and_a_constant_gain_too():
 @pytest.fixture
 def speeds():
     """Four nodes along one axis; the gains of the middle cell are constant."""
-    found = table(dimensionless_grid(linear_axis("omega0", 8, 14, 4), 2.0, 14.0), "case1")
+    found = table(
+        dimensionless_grid(linear_axis("omega0", 8, 14, 4), 2.0, 14.0), "case1", trials=False
+    )
     gains = np.zeros((3, 2))
     gains[1] = found.gains[1] + (3.0, -1.0)
     return replace(found, cells=Cells(np.array([0, 1, 0]), np.full(3, -0.1), gains))
@@ -197,7 +203,9 @@ def test_the_largest_jump_may_be_at_the_border_of_a_cell(speeds):
 
 def test_refining_vouches_for_more_and_keeps_the_nodes():
     coarse = dimensionless_grid(linear_axis("omega0", 1, 9, 3), linear_axis("delta0", 1, 6, 2))
-    tables = [table(coarse, "p", bounds={"K1": (-20.0, 20.0)}, refine=r) for r in (0, 1, 2)]
+    tables = [
+        table(coarse, "p", bounds={"K1": (-20.0, 20.0)}, refine=r, trials=False) for r in (0, 1, 2)
+    ]
     rng = np.random.default_rng(3)
     omega0, delta0 = rng.uniform(1, 9, 800), rng.uniform(1, 6, 800)
     shares = []
@@ -218,7 +226,7 @@ def test_refining_vouches_for_more_and_keeps_the_nodes():
 
 def test_the_error_of_the_spectral_abscissa_is_told():
     # The best gains make a root of multiplicity five, which rounding splits.
-    found = table(dimensionless_grid(6.0, 9.7), "case2")
+    found = table(dimensionless_grid(6.0, 9.7), "case2", trials=False)
     K1, K2 = found.gains_at(6.0, 9.7, 14.0)
     told = analyze(found.grid.points[0], "case2", K1[0], K2[0]).loop
     assert found.abscissa_error[0] == told.abscissa_error > 1e-4
@@ -239,10 +247,10 @@ def test_people_read_the_units_of_the_field(on_rig):
 def test_another_objective_is_designed_for_at_each_node():
     grid = dimensionless_grid(linear_axis("omega0", 9, 11, 2), 2.0, 14.0)
     worst = WorstCase(psi=0.2)
-    found = table(grid, "case1", objective=worst)
-    best = table(grid, "case1")
+    found = table(grid, "case1", objective=worst, trials=False)
+    best = table(grid, "case1", trials=False)
     for i, point in enumerate(grid.points):
-        alone = design(point, "case1", objective=worst)
+        alone = design(point, "case1", objective=worst, trials=False)
         assert found.entries[i] == pytest.approx([alone.K1.item(), alone.K2.item()], abs=1e-12)
     # What is gained off the node costs decay on it.
     assert (found.spectral_abscissa > best.spectral_abscissa).all()
