@@ -35,7 +35,7 @@ PAPER = [
 def at_f():
     """Point F of the paper, without charts."""
     point = OperatingPoint(10.0, 12.0, 14.0)
-    return compare(point, given=PAPER, region=None, duration=120.0)
+    return compare(point, given=PAPER, region=None, duration=120.0, trials=False)
 
 
 def row(comparison, label):
@@ -135,7 +135,7 @@ def test_every_form_holds_every_row(at_f):
     assert float(lines[0]["spectral_abscissa"]) == fields["rows"][0]["spectral_abscissa"]
     text = at_f.summary()
     assert all(one.label in text for one in at_f.rows)
-    assert "stabilises the point, p does not" in text
+    assert "stabilises the point, p does not" in " ".join(text.split())
 
 
 class _Page(html.parser.HTMLParser):
