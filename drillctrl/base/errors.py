@@ -1,4 +1,4 @@
-"""The one exception that bad input raises, and the checks that raise it."""
+"""The exception that bad input raises, with its kin, and the checks that raise it."""
 
 from __future__ import annotations
 
@@ -34,6 +34,13 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.parameter, self.value, self.permitted)
+
+
+class UndecidedError(InputError):
+    """Input that is permitted, but beyond what could be decided of it.
+
+    Parameters are those of `InputError`; ``permitted`` says what was tried.
+    """
 
 
 def interval_text(low: float = -math.inf, high: float = math.inf, *, open_low: bool = False) -> str:

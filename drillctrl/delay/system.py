@@ -12,6 +12,9 @@ import scipy.linalg
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 
+# Rows and columns whose sums differ by more than this are scaled.
+_UNBALANCED = 1e3
+
 
 def _matrix(name: str, value: npt.ArrayLike, shape: tuple[int | None, int | None]) -> FloatArray:
     try:
@@ -30,6 +33,19 @@ def _matrix(name: str, value: npt.ArrayLike, shape: tuple[int | None, int | None
     return matrix
 
 
+def _in_order(
+    a0: FloatArray, delays: tuple[float, ...], delayed: tuple[FloatArray, ...]
+) -> tuple[FloatArray, tuple[float, ...], tuple[FloatArray, ...]]:
+    """Return A0, delays > 0 that increase, and their matrices."""
+    matrices = {0.0: a0}
+    for tau, matrix in sorted(zip(delays, delayed, strict=True), key=lambda pair: pair[0]):
+        matrices[tau] = matrices[tau] + matrix if tau in matrices else matrix
+    for matrix in matrices.values():
+        matrix.setflags(write=False)
+    a0 = matrices.pop(0.0)
+    return a0, tuple(matrices), tuple(matrices.values())
+
+
 @dataclass(frozen=True, eq=False)
 class DelaySystem:
     """A linear time-invariant system of retarded type.
@@ -41,11 +57,12 @@ class DelaySystem:
     delayed : tuple of array, (n, n)
         Ai, acts on X(t − τi).
     delays : tuple of float
-        τi > 0, strictly increasing.
-    B : array, (n, m)
-        Acts on the inputs.
-    C : array, (p, n)
-        Yields the outputs.
+        τi > 0, strictly increasing. They may be given in any order, equal ones and 0 too:
+        equal ones are added up, and 0 is added to A0.
+    B : array, (n, m), optional
+        Acts on the inputs; without it there are none.
+    C : array, (p, n), optional
+        Yields the outputs; without it all states are outputs.
     state_names, input_names, output_names : tuple of str
         Names in order.
 
@@ -56,10 +73,11 @@ class DelaySystem:
     """
 
     A0: FloatArray
-    delayed: tuple[FloatArray, ...]
-    delays: tuple[float, ...]
-    B: FloatArray
-    C: FloatArray
+    delayed: tuple[FloatArray, ...] = ()
+    delays: tuple[float, ...] = ()
+    # What is left out is filled in below; from then on both are arrays.
+    B: FloatArray = None  # type: ignore[assignment]
+    C: FloatArray = None  # type: ignore[assignment]
     state_names: tuple[str, ...] = ()
     input_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
@@ -70,23 +88,29 @@ class DelaySystem:
         if n == 0 or a0.shape[1] != n:
             raise InputError("A0", f"array of shape {a0.shape}", "square and not empty")
         delays = tuple(float(tau) for tau in self.delays)
-        increasing = all(a < b for a, b in zip((0.0, *delays), delays, strict=False))
-        if not increasing or not np.isfinite(delays).all():
-            raise InputError("delays", delays, "positive, finite and strictly increasing")
+        if not all(0.0 <= tau < np.inf for tau in delays):
+            raise InputError("delays", delays, "finite and ≥ 0")
         if len(self.delayed) != len(delays):
             raise InputError("delayed", f"{len(self.delayed)} matrices", "one for each delay")
+        delayed = tuple(_matrix("delayed", a, (n, n)) for a in self.delayed)
+        if not all(a < b for a, b in zip((0.0, *delays), delays, strict=False)):
+            a0, delays, delayed = _in_order(a0, delays, delayed)
+        states = tuple(self.state_names)
+        outputs = tuple(self.output_names)
+        if self.C is None:
+            outputs = outputs or states
         put = functools.partial(object.__setattr__, self)
         put("A0", a0)
         put("delays", delays)
-        put("delayed", tuple(_matrix("delayed", a, (n, n)) for a in self.delayed))
-        put("B", _matrix("B", self.B, (n, None)))
-        put("C", _matrix("C", self.C, (None, n)))
-        for field, letter, size in (
-            ("state_names", "x", n),
-            ("input_names", "u", self.B.shape[1]),
-            ("output_names", "y", self.C.shape[0]),
+        put("delayed", delayed)
+        put("B", _matrix("B", np.zeros((n, 0)) if self.B is None else self.B, (n, None)))
+        put("C", _matrix("C", np.eye(n) if self.C is None else self.C, (None, n)))
+        for field, given, letter, size in (
+            ("state_names", states, "x", n),
+            ("input_names", tuple(self.input_names), "u", self.B.shape[1]),
+            ("output_names", outputs, "y", self.C.shape[0]),
         ):
-            names = tuple(getattr(self, field)) or tuple(f"{letter}{i + 1}" for i in range(size))
+            names = given or tuple(f"{letter}{i + 1}" for i in range(size))
             if len(names) != size or len(set(names)) != size:
                 raise InputError(field, names, f"{size} different names")
             put(field, names)
@@ -127,6 +151,31 @@ class DelaySystem:
             tuple(tau / unit for tau in self.delays),
             self.B * unit,
             self.C,
+            self.state_names,
+            self.input_names,
+            self.output_names,
+        )
+
+
+    def balanced(self) -> DelaySystem:
+        """Return the system with its states scaled so that the matrices' norms are small.
+
+        It is the system itself where that is so already. Inputs, outputs and roots stay.
+        """
+        total = np.abs(self.A0)
+        for matrix in self.delayed:
+            total = total + np.abs(matrix)
+        rows, columns = total.sum(axis=1), total.sum(axis=0)
+        if (rows <= _UNBALANCED * columns).all() and (columns <= _UNBALANCED * rows).all():
+            return self
+        _, (scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
+        ratio = scale[None, :] / scale[:, None]
+        return DelaySystem(
+            self.A0 * ratio,
+            tuple(a * ratio for a in self.delayed),
+            self.delays,
+            self.B / scale[:, None],
+            self.C * scale,
             self.state_names,
             self.input_names,
             self.output_names,

@@ -18,17 +18,18 @@ _EXPONENT_LIMIT = 300.0
 
 def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return Δ(s) for every s, shape (..., n, n)."""
-    return _matrix_and_derivative(system, np.asarray(s, dtype=complex), with_derivative=False)[0]
+    return matrix_and_derivative(system, np.asarray(s, dtype=complex), with_derivative=False)[0]
 
 
 def derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return dΔ/ds for every s, shape (..., n, n)."""
-    return _matrix_and_derivative(system, np.asarray(s, dtype=complex))[1]
+    return matrix_and_derivative(system, np.asarray(s, dtype=complex))[1]
 
 
-def _matrix_and_derivative(
+def matrix_and_derivative(
     system: DelaySystem, points: ComplexArray, with_derivative: bool = True
 ) -> tuple[ComplexArray, ComplexArray]:
+    """Return Δ(s) and, unless it is not wanted, dΔ/ds for every s."""
     points = points[..., None, None]
     identity = np.eye(system.order)
     delta = points * identity - system.A0
@@ -61,14 +62,17 @@ def log_derivative_at(system: DelaySystem, s: complex) -> complex:
 
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
-    points = np.asarray(s, dtype=complex)
-    delta, slope = _matrix_and_derivative(system, points)
+    return trace_ratio(*matrix_and_derivative(system, np.asarray(s, dtype=complex)))
+
+
+def trace_ratio(delta: ComplexArray, slope: ComplexArray) -> ComplexArray:
+    """Return tr(Δ⁻¹ Δ'); infinite where Δ is singular."""
     try:
         inverse = np.linalg.inv(delta)
     except np.linalg.LinAlgError:
         # An s that is a root to the last bit: leave it where it is.
-        values = np.full(points.shape, np.inf + 0j)
-        for index in np.ndindex(points.shape):
+        values = np.full(delta.shape[:-2], np.inf + 0j)
+        for index in np.ndindex(values.shape):
             try:
                 values[index] = np.trace(np.linalg.solve(delta[index], slope[index]))
             except np.linalg.LinAlgError:

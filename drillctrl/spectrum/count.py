@@ -1,6 +1,7 @@
 """Count the characteristic roots right of a line by the argument principle.
 
-Independent of how the roots were found: only det Δ is evaluated, on the line itself.
+Independent of how the roots were found: only det Δ is evaluated, on the line itself, through
+the delayed signals (`drillctrl.delay.reduced`).
 """
 
 from __future__ import annotations
@@ -11,13 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
 
 _LARGEST_STEP = 1.2
 _LARGEST_SURPRISE = 0.5
-_MAX_POINTS = 200_000
+_MAX_POINTS = 400_000
+# Up to so many states and points Δ itself costs less than its reduction.
+_SMALL, _FEW = 6, 400
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,31 @@ class RootCount:
     points: int
 
 
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """det Δ along the upper half of a vertical line.
+
+    Attributes
+    ----------
+    result : RootCount
+        What the turn of its argument says.
+    omega : array, (k,)
+        Im s of the points, increasing from 0 to the height.
+    slope : array, (k,)
+        (det Δ)'/det Δ there.
+    """
+
+    result: RootCount
+    omega: FloatArray
+    slope: ComplexArray
+
+
 def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 
-    Where r, the modulus of s, exceeds the Perron bound ρ, each eigenvalue of I − M(s)/s turns
-    by less than asin(ρ/r), so det Δ(s)/sⁿ stays in the right half-plane beyond ρ/sin(π/2n) and the
-    contour closes at infinity without further evaluation. Below, steps are halved until
+    Where the modulus of s exceeds the Perron bound all eigenvalues μ of (A0 + Σ Ai e^(−sτi))/s
+    lie in the unit disc, so each factor 1 − μ of det Δ(s)/sⁿ stays in the right half-plane and
+    the contour closes at infinity without further evaluation. Below, steps are halved until
     the logarithmic derivative of det Δ, at both ends, limits the turn, and the turn is what
     it predicts. Roots close to the line, several of them too, make the derivative large on
     either side and so cannot slip through between two points.
@@ -59,18 +82,34 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
     line : float
         Re s of the line.
     """
-    n = system.order
-    height = magnitude_bound(system, line) / math.sin(math.pi / (2 * n)) * 1.001 + 1e-9
-    first = 32 + int(2.0 * height * system.max_delay)
-    if first > _MAX_POINTS:
-        return RootCount(line, None, height, 0)
+    return follow(system, line).result
+
+
+def follow(system: DelaySystem, line: float, loops: ReducedLoops | None = None) -> Followed:
+    """Follow det Δ up a line; see `count_right_of`.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The system.
+    line : float
+        Re s of the line.
+    loops : ReducedLoops, optional
+        The same, reduced, where that is at hand.
+    """
+    height = magnitude_bound(system, line) * 1.001 + 1e-9
+    turns = height * system.max_delay
+    if not turns < 0.5 * _MAX_POINTS:
+        return Followed(RootCount(line, None, height, 0), np.zeros(0), np.zeros(0, complex))
     # Denser towards the bottom, where det Δ is far from its asymptote.
-    omega = height * np.linspace(0.0, 1.0, first) ** 2
-    phase, slope = _phase_and_slope(system, line, omega)
-    points = first
+    omega = height * np.linspace(0.0, 1.0, 40 + int(2.0 * turns)) ** 2
+    if loops is None and (system.order > _SMALL or omega.size > _FEW):
+        loops = reduced(system)
+    phase, slope = _phase_and_slope(system, loops, line, omega)
     while True:
+        undecided = RootCount(line, None, height, omega.size)
         if not np.isfinite(slope).all():
-            return RootCount(line, None, height, points)
+            return Followed(undecided, omega, slope)
         width = np.diff(omega)
         turn = np.remainder(np.diff(phase) + math.pi, 2 * math.pi) - math.pi
         # arg det Δ(line + iω) changes at the rate Re (det Δ)'/det Δ.
@@ -81,27 +120,37 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
         )
         if coarse.size == 0:
             break
-        if points > _MAX_POINTS or width[coarse].min() < 1e-13 * height:
-            return RootCount(line, None, height, points)
+        if omega.size > _MAX_POINTS or width[coarse].min() < 1e-13 * height:
+            return Followed(undecided, omega, slope)
         middle = 0.5 * (omega[coarse] + omega[coarse + 1])
-        new_phase, new_slope = _phase_and_slope(system, line, middle)
+        new_phase, new_slope = _phase_and_slope(system, loops, line, middle)
         omega = np.insert(omega, coarse + 1, middle)
         phase = np.insert(phase, coarse + 1, new_phase)
         slope = np.insert(slope, coarse + 1, new_slope)
-        points += middle.size
-    end = math.atan2(omega[-1], line)
-    rest = n * (math.pi / 2 - end)
-    beyond = np.remainder(phase[-1] - n * end + math.pi, 2 * math.pi) - math.pi
-    count = n / 2 - (turn.sum() + rest - beyond) / math.pi
-    whole = round(float(count))
-    return RootCount(line, whole if abs(count - whole) < 1e-3 else None, height, points)
+    beyond = _argument_beyond(system, complex(line, omega[-1]))
+    total = system.order / 2 - (turn.sum() - beyond) / math.pi
+    total -= system.order * (0.5 - math.atan2(omega[-1], line) / math.pi)
+    whole = round(float(total))
+    count = whole if abs(total - whole) < 1e-3 else None
+    return Followed(RootCount(line, count, height, omega.size), omega, slope)
+
+
+def _argument_beyond(system: DelaySystem, s: complex) -> float:
+    """Return arg (det Δ(s)/sⁿ), the branch that vanishes at infinity."""
+    matrix = characteristic.matrix(system, s)
+    share = np.eye(system.order) - matrix / s
+    return float(np.angle(1.0 - np.linalg.eigvals(share)).sum())
 
 
 def _phase_and_slope(
-    system: DelaySystem, line: float, omega: FloatArray
+    system: DelaySystem, loops: ReducedLoops | None, line: float, omega: FloatArray
 ) -> tuple[FloatArray, ComplexArray]:
     """Return arg det Δ and (det Δ)'/det Δ at line + iω; NaN where Δ is singular."""
     s = line + 1j * omega
-    sign, size = np.linalg.slogdet(characteristic.matrix(system, s))
-    slope = characteristic.log_derivative(system, s)
-    return np.angle(sign), np.where(np.isfinite(size), slope, np.nan)
+    if loops is None:
+        delta, change = characteristic.matrix_and_derivative(system, s)
+        unit, amount = np.linalg.slogdet(delta)
+        ratio = characteristic.trace_ratio(delta, change)
+        return np.angle(unit), np.where(np.isfinite(amount), ratio, np.nan)
+    sign, size, slope = loops.evaluate(s[None])
+    return np.angle(sign[0]), np.where(np.isfinite(size[0]), slope[0], np.nan)

@@ -9,15 +9,18 @@ are known to the k-th root of rounding only.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, UndecidedError, checked_number
+from drillctrl.delay.reduced import reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
+from drillctrl.spectrum.climb import MOST_ROOTS, Climb
+from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,
@@ -38,6 +41,12 @@ _CLOSE = 0.2
 # root that stands alone.
 _WIDE = 0.1
 _NARROW = 1e-3
+# Largest matrix of a collocation that is to resolve everything, and of one that is to
+# supply first places only.
+_LARGEST = 240
+_SMALLEST = 100
+# Roots that are iterated on together.
+_FEW = 100
 
 
 @dataclass(frozen=True)
@@ -155,7 +164,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
 def _gather(
     system: DelaySystem, depth: float, line: float | None = None
 ) -> tuple[ComplexArray, BoolArray]:
-    """Return polished roots, raising the degree of the collocation until all converge.
+    """Return polished roots, rightmost first, all of them converged.
 
     Parameters
     ----------
@@ -166,16 +175,28 @@ def _gather(
     line : float, optional
         Roots right of it are wanted, whatever the depth.
     """
+    found = _collocated(system, depth, line)
+    return _counted(system, depth, line) if found is None else found
+
+
+def _collocated(
+    system: DelaySystem, depth: float, line: float | None
+) -> tuple[ComplexArray, BoolArray] | None:
+    """Polish what a collocation that resolves all of it supplies; None beyond its reach."""
+    ranks = sum(left.shape[1] for left, _ in system.factors)
+
+    def in_reach(degree: int) -> bool:
+        return degree < MAX_DEGREE and (system.order + degree * ranks <= _LARGEST or degree <= 8)
+
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
     sure = sure if line is None else line
     reach = characteristic.magnitude_bound(system, sure)
     degree = degree_for_reach(reach * system.max_delay)
-    while True:
+    while in_reach(degree):
         values = generator_eigenvalues(system, degree)
-        size = np.abs(values)
         # No root lies beyond the bound: what the collocation has there is its own.
-        inside = values[(values.imag >= 0) & (size <= 1.1 * reach)]
+        inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
         floor = line
         if floor is None:
             while inside.size == 0 or inside.real.max() - depth < sure:
@@ -186,11 +207,13 @@ def _gather(
                     sure -= 0.5 / system.max_delay
                 reach = characteristic.magnitude_bound(system, sure)
                 degree = max(degree, degree_for_reach(reach * system.max_delay))
+                if not in_reach(degree):
+                    return None
                 values = generator_eigenvalues(system, degree)
                 inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
-                if inside.size and degree >= MAX_DEGREE:
-                    break
             floor = float(inside.real.max()) - depth
+        elif inside.size == 0:
+            return np.zeros(0, dtype=complex), np.zeros(0, dtype=bool)
         # Starting values of a k-fold root are off by the k-th root of the error.
         slack = _WIDE
         if depth == 0.0 and line is None:
@@ -204,10 +227,53 @@ def _gather(
             start = inside[inside.real >= floor - _WIDE * (1.0 + np.abs(inside))]
             s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
-        if (done & ~strayed).all() or degree > MAX_DEGREE // 2:
+        if (done & ~strayed).all():
             order = np.argsort(-s.real, kind="stable")
             return s[order], done[order]
         degree *= 2
+    return None
+
+
+def _counted(
+    system: DelaySystem, depth: float, line: float | None
+) -> tuple[ComplexArray, BoolArray]:
+    """Return roots that the argument principle has counted.
+
+    Raises
+    ------
+    UndecidedError
+        If as many roots as are counted cannot be found.
+    """
+    climb = Climb(system, reduced(system))
+    unit = 1.0 / system.max_delay if system.delays else 1.0
+    if line is None:
+        climb.ascend(_first_places(system))
+        depth = max(min(depth, unit), 0.05 * unit)
+    found = None
+    for _ in range(20):
+        floor = float(climb.roots[0].real) - depth if line is None else line
+        found = climb.right_of(floor, MOST_ROOTS if line is not None or depth == unit else _FEW)
+        if found is not None or line is not None:
+            break
+        depth *= 0.25
+    if found is None:
+        raise climb.refuse(f"more than {MOST_ROOTS} roots lie right of {floor:.6g}")
+    s, done = polish(system, found) if found.size <= _FEW else (found, np.ones(found.size, bool))
+    if not done.all():
+        raise climb.refuse(f"{int((~done).sum())} of {done.size} roots do not converge")
+    order = np.argsort(-s.real, kind="stable")
+    return s[order], done[order]
+
+
+def _first_places(system: DelaySystem) -> ComplexArray:
+    """Return where to look first: eigenvalues without delay and of a small collocation."""
+    ranks = max(1, sum(left.shape[1] for left, _ in system.factors))
+    degree = max(4, (_SMALLEST - system.order) // ranks)
+    places = [np.linalg.eigvals(system.A0), np.linalg.eigvals(system.A0 + sum(system.delayed))]
+    if system.order + degree * ranks <= _LARGEST:
+        values = generator_eigenvalues(system, degree)
+        places.append(values[np.argsort(-values.real)[:64]])
+    return np.concatenate(places).astype(complex)
 
 
 def spectral_abscissa(system: DelaySystem) -> float:
@@ -218,12 +284,13 @@ def spectral_abscissa(system: DelaySystem) -> float:
     Where roots coincide to rounding the value is the real part of their centre; see
     `dominant_roots` for the spread.
     """
+    system, unit = _in_own_units(system)
     s, done = _gather(system, 0.0)
     top = complex(s[0])
     isolated = s.size == 1 or (np.abs(top - s[1:]) > _CLOSE * (1.0 + abs(top))).all()
     if isolated and (top.imag == 0 or top.imag > _CLOSE):
-        return top.real
-    return max(root.rightmost for root in _resolve(system, s, done))
+        return top.real / unit
+    return max(root.rightmost for root in _resolve(system, s, done)) / unit
 
 
 def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
@@ -232,8 +299,9 @@ def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
     Those within 1/τ of the spectral abscissa are given, with τ the largest delay, and all
     of them where there is no delay.
     """
+    system, unit = _in_own_units(system)
     depth = 1.0 / system.max_delay if system.delays else 1e300
-    return _resolve(system, *_gather(system, depth))
+    return _slowed(_resolve(system, *_gather(system, depth)), unit)
 
 
 def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ...]:
@@ -258,11 +326,55 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
         too many to resolve.
     """
     line = checked_number("right_of", right_of)
-    reach = characteristic.magnitude_bound(system, line) * system.max_delay
-    if 0.55 * reach + 5 > MAX_DEGREE:
-        raise InputError("right_of", line, "further right: too many roots to resolve")
-    s, done = _gather(system, 0.0, line)
-    return tuple(root for root in _resolve(system, s, done) if root.rightmost >= line)
+    system, unit = _in_own_units(system)
+    line *= unit
+    counted = count_right_of(system, line).count
+    if counted is None:
+        raise InputError("right_of", right_of, "another line: roots right of it cannot be counted")
+    try:
+        for gather in (_collocated, _counted):
+            found = gather(system, 0.0, line)
+            if found is None:
+                continue
+            roots = tuple(root for root in _resolve(system, *found) if root.rightmost >= line)
+            if _total(roots) == counted:
+                return _slowed(roots, unit)
+    except UndecidedError as error:
+        raise InputError("right_of", right_of, f"another line: {error.permitted}") from None
+    raise InputError(
+        "right_of", right_of, f"another line: {counted} roots are counted, {_total(roots)} found"
+    )
+
+
+def _in_own_units(system: DelaySystem) -> tuple[DelaySystem, float]:
+    """Return the system balanced, in a unit of time that suits its roots, and that unit."""
+    system = system.balanced()
+    delay = system.max_delay
+    size = float(np.abs(system.A0).max())
+    if 1e-2 <= delay <= 1e2 and size * max(delay, 1.0) >= 1e-2:
+        return system, 1.0
+    bound = characteristic.magnitude_bound(system, 0.0)
+    if not bound > 1e-290:
+        return system, 1.0
+    unit = 2.0 ** round(math.log2(max(delay, 1.0 / bound)))
+    return system.scaled_time(unit), unit
+
+
+def _slowed(roots: tuple[Root, ...], unit: float) -> tuple[Root, ...]:
+    """Return roots per old unit of time."""
+    if unit == 1.0:
+        return roots
+    return tuple(
+        replace(
+            root,
+            real=root.real / unit,
+            imag=root.imag / unit,
+            spread=root.spread / unit,
+            rightmost=root.rightmost / unit,
+            condition=root.condition / unit**root.multiplicity,
+        )
+        for root in roots
+    )
 
 
 def _resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root, ...]:
@@ -279,6 +391,11 @@ def _resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Roo
         roots.append(root)
         left = [i for i in left if i not in members]
     return tuple(sorted(roots, key=lambda root: (-root.rightmost, root.imag)))
+
+
+def _total(roots: tuple[Root, ...]) -> int:
+    """Return the number of roots, conjugates and multiplicities counted."""
+    return sum(root.multiplicity * (2 if root.imag > 0 else 1) for root in roots)
 
 
 def _weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
@@ -322,7 +439,10 @@ def _cluster(
     mirrored = [(i, s[i]) for i in left] + [(i, s[i].conjugate()) for i in left if s[i].imag > 0]
     mirrored.sort(key=lambda item: abs(item[1] - s[first]))
     values = np.array([value for _, value in mirrored])
-    near = int((np.abs(values - s[first]) < _CLOSE * (1.0 + abs(s[first]))).sum())
+    # Roots of a chain lie 2π/τ apart.
+    close = _CLOSE * (1.0 + abs(s[first]))
+    close = min(close, 2.0 / system.max_delay) if system.delays else close
+    near = int((np.abs(values - s[first]) < close).sum())
     for size in range(near, 1, -1):
         members = values[:size]
         centre = complex(members.mean())

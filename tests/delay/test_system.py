@@ -41,9 +41,8 @@ def test_the_plant_delays_one_signal(plant_c):
         ({"A0": np.zeros((2, 3))}, "A0"),
         ({"A0": np.array([[np.nan, 0], [0, 0]])}, "A0"),
         ({"A0": [["a", "b"], ["c", "d"]]}, "A0"),
-        ({"delays": (0.0,)}, "delays"),
+        ({"delays": (-1.0,)}, "delays"),
         ({"delays": (float("nan"),)}, "delays"),
-        ({"delays": (1.0, 1.0)}, "delays"),
         ({"delays": (1.0, 2.0)}, "delayed"),
         ({"B": np.zeros((3, 1))}, "B"),
         ({"C": np.zeros((1, 3))}, "C"),
@@ -60,6 +59,39 @@ def test_what_does_not_fit_is_refused(change, message):
     }
     with pytest.raises(InputError, match=f"^{message} = "):
         DelaySystem(**{**good, **change})
+
+
+def test_delays_are_put_in_order():
+    one, two, three, four = (k * np.eye(2) for k in (1.0, 2.0, 3.0, 4.0))
+    system = DelaySystem(one, (two, three, four, one), (5.0, 0.0, 1.0, 5.0))
+    assert system.delays == (1.0, 5.0)
+    assert (system.A0 == 4.0 * np.eye(2)).all()
+    assert [float(a[0, 0]) for a in system.delayed] == [4.0, 3.0]
+    with pytest.raises(ValueError, match="read-only"):
+        system.A0[0, 0] = 0.0
+
+
+def test_inputs_and_outputs_may_be_left_out():
+    system = DelaySystem([[0.0, 1.0], [-1.0, 0.0]], state_names=("x", "v"))
+    assert system.B.shape == (2, 0)
+    assert system.C.tolist() == [[1.0, 0.0], [0.0, 1.0]]
+    assert system.output_names == ("x", "v")
+    assert system.delays == ()
+
+
+def test_balancing_keeps_the_response():
+    rng = np.random.default_rng(0)
+    units = np.array([1e-5, 1.0, 1e4])
+    a0, a1 = rng.normal(size=(2, 3, 3)) * units[:, None] / units
+    system = DelaySystem(a0, (a1,), (0.7,), rng.normal(size=(3, 2)) * units[:, None])
+    other = system.balanced()
+    assert np.abs(other.A0).max() < 1e2 < np.abs(system.A0).max()
+    s = 0.3 + 1.1j
+    one, two = (
+        p.C @ np.linalg.solve(s * np.eye(3) - p.A0 - np.exp(-0.7 * s) * p.delayed[0], p.B)
+        for p in (system, other)
+    )
+    assert np.allclose(one, two, rtol=1e-9)
 
 
 def test_values_cannot_be_changed_afterwards(plant_c):
