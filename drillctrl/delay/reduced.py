@@ -221,8 +221,8 @@ def _small_determinant(
     return value, ratio
 
 
-def reduced(system: DelaySystem) -> ReducedLoops:
-    """Return a single system as the one loop of a family.
+def reduced(system: DelaySystem, *, plain: bool = False) -> ReducedLoops:
+    """Return a single system as the one loop of a family; see `reduced_loops`.
 
     Its states are scaled first, so that the units in which they are given do not matter.
     """
@@ -236,11 +236,29 @@ def reduced(system: DelaySystem) -> ReducedLoops:
         np.hstack(left)[None],
         np.vstack(right)[None],
         np.concatenate([np.zeros(0), *delays])[None],
+        plain=plain,
     )
 
 
+def reduced_matrices(
+    A0: FloatArray, A1: FloatArray, delays: FloatArray, *, plain: bool = False
+) -> ReducedLoops:
+    """Return N loops X' = A0 X + A1 X(t − τ), (N, n, n), (N, n, n) and (N,)."""
+    left, sizes, right = np.linalg.svd(A1)
+    floor = A1.shape[-1] * np.finfo(float).eps * sizes[:, :1]
+    rank = int((sizes > floor).sum(axis=1).max(initial=0))
+    left = left[:, :, :rank] * sizes[:, None, :rank]
+    late = np.repeat(np.asarray(delays, dtype=float)[:, None], rank, axis=1)
+    return reduced_loops(A0, left, right[:, :rank], late, plain=plain)
+
+
 def reduced_loops(
-    A0: FloatArray, left: FloatArray, right: FloatArray, delays: FloatArray
+    A0: FloatArray,
+    left: FloatArray,
+    right: FloatArray,
+    delays: FloatArray,
+    *,
+    plain: bool = False,
 ) -> ReducedLoops:
     """Return N loops X' = A0 X + Σ l_j (r_j X)(t − τ_j).
 
@@ -252,28 +270,38 @@ def reduced_loops(
         Columns l_j and rows r_j.
     delays : array, (N, r)
         τ_j.
+    plain : bool
+        Take the n × n matrices: better for few states at few points.
     """
     count, n, rank = left.shape
     factor = np.full(count, np.nan)
     poles = np.zeros((count, n), dtype=complex)
     # With many delayed signals Δ itself is the smaller matrix.
-    reducible = rank < max(3.0, 0.6 * n)
-    residues = np.zeros((count, n, rank * rank if reducible else 0), dtype=complex)
-    rest = np.arange(count if reducible else 0)
+    plain = plain or rank >= max(3.0, 0.6 * n)
+    residues = np.zeros((count, n, 0 if plain else rank * rank), dtype=complex)
+    rest = np.arange(0 if plain else count)
     for z in _SPLITTINGS:
         if not rest.size:
             break
         some = A0[rest] if z == 0.0 else A0[rest] + z * left[rest] @ right[rest]
         values, vectors = np.linalg.eig(some)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            condition = np.linalg.cond(vectors) if n > 1 else np.ones(rest.size)
+        inverse = _inverses(vectors)
+        condition = np.linalg.norm(inverse, axis=(1, 2))
         safe = np.flatnonzero(condition < _SAFE_CONDITION)
         place = rest[safe]
-        vectors = vectors[safe]
-        driven = np.linalg.solve(vectors, left[place].astype(complex))
-        seen = right[place] @ vectors
+        driven, seen = inverse[safe] @ left[place], right[place] @ vectors[safe]
         factor[place], poles[place] = z, values[safe]
-        table = np.einsum("qai,qib->qiab", seen, driven)
+        table = seen.transpose(0, 2, 1)[..., None] * driven[:, :, None, :]
         residues[place] = table.reshape(len(place), n, rank * rank)
         rest = np.delete(rest, safe)
     return ReducedLoops(A0, left, right, delays, factor, poles, residues)
+
+
+def _inverses(matrices: ComplexArray) -> ComplexArray:
+    """Return the inverse of each matrix, infinite where there is none."""
+    try:
+        return np.asarray(np.linalg.inv(matrices))
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full(matrices.shape, np.inf + 0j)
+        return np.concatenate([_inverses(matrix[None]) for matrix in matrices])

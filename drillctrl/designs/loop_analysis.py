@@ -9,10 +9,12 @@ import numpy as np
 
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.count import count_right_of
-from drillctrl.spectrum.roots import Root, dominant_roots
+from drillctrl.spectrum.roots import Root, known_roots
 from drillctrl.spectrum.semidiscretization import semidiscretize
 
 DEFAULT_ORDER = 2
+# Roots that are looked at, the rightmost; hundreds would say no more.
+_MOST = 24
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,8 @@ def discretised_radius(
 
 def analyze_loop(system: DelaySystem) -> LoopAnalysis:
     """Analyse a delay system by roots and count alone."""
-    roots = dominant_roots(system)
-    certificate = _certify(system, roots)
+    roots, floor = known_roots(system, _MOST)
+    certificate = _certify(system, roots, floor)
     top = roots[0]
     error = top.error + 1e-15 * abs(top.rightmost)
     limit = top.rightmost - max(error, 1e-6 * (1.0 + abs(top.rightmost)))
@@ -124,17 +126,15 @@ def analyze_loop(system: DelaySystem) -> LoopAnalysis:
     )
 
 
-def _certify(system: DelaySystem, roots: tuple[Root, ...]) -> Certificate:
+def _certify(system: DelaySystem, roots: tuple[Root, ...], floor: float) -> Certificate:
     """Count right of a line drawn in the widest gap left of the dominant root."""
-    floor = roots[0].rightmost - 1.0
     if system.delays:
-        floor = roots[0].rightmost - 1.0 / system.max_delay
         # Further left some roots may be known, but not all of them.
         roots = tuple(root for root in roots if root.rightmost > floor)
     # A cluster reaches as far left of its centre as right of it.
     ends = [root.real - max(root.spread, root.error) for root in roots]
     below = [root.rightmost for root in roots[1:]]
-    below.append(floor if system.delays else min(floor, ends[-1] - 1.0))
+    below.append(floor if system.delays else ends[-1] - 1.0)
     gaps = [min(ends[: i + 1]) - lower for i, lower in enumerate(below)]
     widest = int(np.argmax(gaps))
     line = below[widest] + 0.5 * gaps[widest]

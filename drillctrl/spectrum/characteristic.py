@@ -98,3 +98,15 @@ def perron_root(matrix: FloatArray) -> float:
     real, imag, _, _, info = dgeev(matrix, 0, 0)
     value = float(np.hypot(real, imag).max()) if info == 0 else float(np.linalg.norm(matrix))
     return value * (1.0 + 1e-10) + 1e-300
+
+
+def perron_bounds(
+    A0: FloatArray, A1: FloatArray, delays: FloatArray, right_of: float
+) -> FloatArray:
+    """Return `magnitude_bound` of N loops with one delay each, shape (N,).
+
+    ``A0`` and ``A1``, both (N, n, n), may be entrywise bounds of whole families.
+    """
+    growth = np.exp(np.minimum(-right_of * delays, _EXPONENT_LIMIT))[:, None, None]
+    total = np.abs(A0) + np.abs(A1) * growth
+    return np.asarray(np.abs(np.linalg.eigvals(total)).max(axis=1) * (1.0 + 1e-9) + 1e-12)

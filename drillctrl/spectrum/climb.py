@@ -21,6 +21,7 @@ from drillctrl.spectrum.count import Followed, follow
 
 _EPSILON = float(np.finfo(float).eps)
 _ROUNDS = 60
+_BISECTIONS = 12
 _MOST_STARTS = 4000
 _FINALISTS = 96
 MOST_ROOTS = 400
@@ -57,6 +58,10 @@ class Climb:
             f"one whose roots can be told apart: {what}",
         )
 
+    def follow(self, line: float) -> Followed:
+        """Follow det Δ up a line."""
+        return follow(self.loops, line, magnitude_bound(self.system, line))
+
     def add(self, starts: ComplexArray, keep: int | None = None) -> None:
         """Run Newton's method from many places and keep the roots that it converges to.
 
@@ -72,10 +77,13 @@ class Climb:
         s = np.where(starts.imag < 0, starts.conj(), starts).astype(complex)
         last = np.full(s.shape, np.inf)
         done = np.zeros(s.shape, dtype=bool)
+        unit = 1.0 / self.system.max_delay if self.system.delays else 1.0
         ceiling = 1.1 * magnitude_bound(self.system, float(s.real.min()))
         for turn in range(40):
             if keep is not None and turn == 5 and s.size > keep:
-                best = np.argsort(-s.real, kind="stable")[:keep]
+                # Those under way to a root first, then the rightmost.
+                order = np.lexsort((-s.real, last > 0.1 * unit))
+                best = order[:keep]
                 s, last, done = s[best], last[best], done[best]
             rest = np.flatnonzero(~done)
             if not rest.size:
@@ -144,7 +152,7 @@ class Climb:
         unit = 1.0 / self.system.max_delay if self.system.delays else 1.0
         low = -0.5 * unit
         while not self.roots.size:
-            seen = follow(self.system, low, self.loops)
+            seen = self.follow(low)
             if seen.result.count is None or low < -300.0 * unit:
                 raise self.refuse(f"no count right of {low:g} after {seen.result.points} points")
             self.add(places(seen), _FINALISTS)
@@ -155,7 +163,7 @@ class Climb:
             line = top + width * max(1e-10 * (1.0 + abs(top)), 10.0 * float(self.errors[0]))
             if line >= high:
                 return
-            seen = follow(self.system, line, self.loops)
+            seen = self.follow(line)
             count = seen.result.count
             if count == 0:
                 return
@@ -169,7 +177,7 @@ class Climb:
             # A root far from the line: bring the line to it.
             while float(self.roots[0].real) <= line and high - low > 1e-10 * (1.0 + abs(low)):
                 middle = 0.5 * (low + high)
-                seen = follow(self.system, middle, self.loops)
+                seen = self.follow(middle)
                 if seen.result.count is None:
                     raise self.refuse(
                         f"no count right of {middle:g} after {seen.result.points} points"
@@ -191,7 +199,7 @@ class Climb:
         UndecidedError
             If the count cannot be made, or is not that of the roots found.
         """
-        seen = follow(self.system, line, self.loops)
+        seen = self.follow(line)
         count = seen.result.count
         if count is None:
             raise self.refuse(f"no count right of {line:g} after {seen.result.points} points")
@@ -203,13 +211,21 @@ class Climb:
         if _total(found) != count:
             self.add(places(seen))
             found = self._repeated(line)
-        top = float(self.roots[0].real) if self.roots.size else line
-        for share in (0.25, 0.5, 0.75):
-            if _total(found) == count:
+        # What is missing lies far from the line: bisect towards it.
+        low, high = line, float(self.roots[0].real) if self.roots.size else line
+        for _ in range(_BISECTIONS):
+            if _total(found) == count or high <= low:
                 break
-            higher = follow(self.system, line + share * (top - line), self.loops)
+            middle = 0.5 * (low + high)
+            higher = self.follow(middle)
             self.add(places(higher))
             found = self._repeated(line)
+            if higher.result.count is None or _total(found[found.real > middle]) == (
+                higher.result.count
+            ):
+                high = middle
+            else:
+                low = middle
         if _total(found) != count:
             raise self.refuse(
                 f"{count} roots are counted right of {line:.6g} and {_total(found)} are found"

@@ -14,14 +14,15 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
 
 _LARGEST_STEP = 1.2
 _LARGEST_SURPRISE = 0.5
 _MAX_POINTS = 400_000
-# Up to so many states and points Δ itself costs less than its reduction.
-_SMALL, _FEW = 6, 400
+# Up to so many states and bound · τ Δ itself costs less than its reduction.
+_SMALL, _FEW_TURNS = 6, 150.0
+# More states are followed to so many times the bound: the end then costs no eigenvalues.
+_FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class RootCount:
     count : int or None
         Roots right of it, with multiplicity, conjugates counted; None if undecided.
     height : float
-        The line was followed up to this |Im s|; beyond it the norm bound decides.
+        Beyond this |Im s| no root lies right of the line, by a norm bound.
     points : int
         Evaluations of det Δ.
     """
@@ -68,12 +69,13 @@ class Followed:
 def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 
-    Where the modulus of s exceeds the Perron bound all eigenvalues μ of (A0 + Σ Ai e^(−sτi))/s
-    lie in the unit disc, so each factor 1 − μ of det Δ(s)/sⁿ stays in the right half-plane and
-    the contour closes at infinity without further evaluation. Below, steps are halved until
-    the logarithmic derivative of det Δ, at both ends, limits the turn, and the turn is what
-    it predicts. Roots close to the line, several of them too, make the derivative large on
-    either side and so cannot slip through between two points.
+    Where the modulus of s exceeds k times the Perron bound all eigenvalues μ of
+    (A0 + Σ Ai e^(−sτi))/s lie in a disc of radius 1/k, so each factor 1 − μ of det Δ(s)/sⁿ
+    stays in the right half-plane and the contour closes at infinity without further
+    evaluation. Below, steps are halved until the logarithmic derivative of det Δ, at both
+    ends, limits the turn, and the turn is what it predicts. Roots close to the line, several
+    of them too, make the derivative large on either side and so cannot slip through between
+    two points.
 
     Parameters
     ----------
@@ -82,32 +84,41 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
     line : float
         Re s of the line.
     """
-    return follow(system, line).result
+    bound = magnitude_bound(system, line)
+    small = is_small(system.order, bound * system.max_delay)
+    return follow(reduced(system, plain=small), line, bound).result
 
 
-def follow(system: DelaySystem, line: float, loops: ReducedLoops | None = None) -> Followed:
+def is_small(order: int, turns: float) -> bool:
+    """Whether Δ itself costs less than its reduction, for so many states and bound · τ."""
+    return order <= _SMALL and turns < _FEW_TURNS
+
+
+def follow(loops: ReducedLoops, line: float, bound: float) -> Followed:
     """Follow det Δ up a line; see `count_right_of`.
 
     Parameters
     ----------
-    system : DelaySystem
-        The system.
+    loops : ReducedLoops
+        A single loop.
     line : float
         Re s of the line.
-    loops : ReducedLoops, optional
-        The same, reduced, where that is at hand.
+    bound : float
+        What |s| of roots right of the line does not exceed: a Perron root.
     """
-    height = magnitude_bound(system, line) * 1.001 + 1e-9
-    turns = height * system.max_delay
+    bound = bound * 1.001 + 1e-9
+    n, turns = loops.order, bound * float(loops.delays.max(initial=0.0))
     if not turns < 0.5 * _MAX_POINTS:
-        return Followed(RootCount(line, None, height, 0), np.zeros(0), np.zeros(0, complex))
+        return Followed(RootCount(line, None, bound, 0), np.zeros(0), np.zeros(0, complex))
+    small = n <= _SMALL
     # Denser towards the bottom, where det Δ is far from its asymptote.
-    omega = height * np.linspace(0.0, 1.0, 40 + int(2.0 * turns)) ** 2
-    if loops is None and (system.order > _SMALL or omega.size > _FEW):
-        loops = reduced(system)
-    phase, slope = _phase_and_slope(system, loops, line, omega)
+    first = 40 + int(2.0 * turns) + (0 if small else 2 * n)
+    omega = bound * np.linspace(0.0, 1.0, first) ** 2
+    if not small:
+        omega = np.concatenate([omega, bound * np.geomspace(1.0, _FAR, 2 * n)[1:]])
+    phase, slope = _phase_and_slope(loops, line, omega)
     while True:
-        undecided = RootCount(line, None, height, omega.size)
+        undecided = RootCount(line, None, bound, omega.size)
         if not np.isfinite(slope).all():
             return Followed(undecided, omega, slope)
         width = np.diff(omega)
@@ -120,37 +131,38 @@ def follow(system: DelaySystem, line: float, loops: ReducedLoops | None = None) 
         )
         if coarse.size == 0:
             break
-        if omega.size > _MAX_POINTS or width[coarse].min() < 1e-13 * height:
+        if omega.size > _MAX_POINTS or width[coarse].min() < 1e-13 * bound:
             return Followed(undecided, omega, slope)
         middle = 0.5 * (omega[coarse] + omega[coarse + 1])
-        new_phase, new_slope = _phase_and_slope(system, loops, line, middle)
+        new_phase, new_slope = _phase_and_slope(loops, line, middle)
         omega = np.insert(omega, coarse + 1, middle)
         phase = np.insert(phase, coarse + 1, new_phase)
         slope = np.insert(slope, coarse + 1, new_slope)
-    beyond = _argument_beyond(system, complex(line, omega[-1]))
-    total = system.order / 2 - (turn.sum() - beyond) / math.pi
-    total -= system.order * (0.5 - math.atan2(omega[-1], line) / math.pi)
+    top = complex(line, omega[-1])
+    end = math.atan2(top.imag, top.real)
+    beyond = phase[-1] - n * end
+    # The branch that vanishes at infinity.
+    beyond += 2 * math.pi * round((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
+    total = n / 2 - (turn.sum() + n * (math.pi / 2 - end) - beyond) / math.pi
     whole = round(float(total))
     count = whole if abs(total - whole) < 1e-3 else None
-    return Followed(RootCount(line, count, height, omega.size), omega, slope)
+    return Followed(RootCount(line, count, bound, omega.size), omega, slope)
 
 
-def _argument_beyond(system: DelaySystem, s: complex) -> float:
-    """Return arg (det Δ(s)/sⁿ), the branch that vanishes at infinity."""
-    matrix = characteristic.matrix(system, s)
-    share = np.eye(system.order) - matrix / s
-    return float(np.angle(1.0 - np.linalg.eigvals(share)).sum())
+def _argument_beyond(loops: ReducedLoops, s: complex) -> float:
+    """Return arg (det Δ(s)/sⁿ) to within 1, from Σ arg (1 − μ) over the eigenvalues μ."""
+    share = np.eye(loops.order) - loops.matrices(np.array([[s]]))[0, 0] / s
+    if loops.order <= _SMALL:
+        return float(np.angle(1.0 - np.linalg.eigvals(share)).sum())
+    # With |μ| below 1/4 three terms of the logarithm suffice for hundreds of states.
+    square = share @ share
+    powers = np.trace(share) + np.trace(square) / 2.0 + (square * share.T).sum() / 3.0
+    return -float(powers.imag)
 
 
 def _phase_and_slope(
-    system: DelaySystem, loops: ReducedLoops | None, line: float, omega: FloatArray
+    loops: ReducedLoops, line: float, omega: FloatArray
 ) -> tuple[FloatArray, ComplexArray]:
     """Return arg det Δ and (det Δ)'/det Δ at line + iω; NaN where Δ is singular."""
-    s = line + 1j * omega
-    if loops is None:
-        delta, change = characteristic.matrix_and_derivative(system, s)
-        unit, amount = np.linalg.slogdet(delta)
-        ratio = characteristic.trace_ratio(delta, change)
-        return np.angle(unit), np.where(np.isfinite(amount), ratio, np.nan)
-    sign, size, slope = loops.evaluate(s[None])
-    return np.angle(sign[0]), np.where(np.isfinite(size[0]), slope[0], np.nan)
+    sign, size, slope = (part[0] for part in loops.evaluate((line + 1j * omega)[None]))
+    return np.angle(sign), np.where(np.isfinite(size), slope, np.nan)

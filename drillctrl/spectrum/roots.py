@@ -29,6 +29,7 @@ from drillctrl.spectrum.pseudospectral import (
 
 BoolArray = npt.NDArray[np.bool_]
 _Polished = tuple[ComplexArray, BoolArray]
+_Gathered = tuple[ComplexArray, BoolArray, float]
 EPSILON = float(np.finfo(float).eps)
 # Roots that a relative change of the coefficients this small makes coincide are reported
 # as one multiple root: gains are rarely known to more digits.
@@ -45,6 +46,7 @@ _NARROW = 1e-3
 # supply first places only.
 _LARGEST = 240
 _SMALLEST = 100
+_LARGEST_CLUSTER = 24
 # Roots that are iterated on together.
 _FEW = 100
 
@@ -163,8 +165,8 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
 
 def _gather(
     system: DelaySystem, depth: float, line: float | None = None
-) -> tuple[ComplexArray, BoolArray]:
-    """Return polished roots, rightmost first, all of them converged.
+) -> _Gathered:
+    """Return polished roots, rightmost first, all of them converged, and where they end.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def _gather(
 
 def _collocated(
     system: DelaySystem, depth: float, line: float | None
-) -> tuple[ComplexArray, BoolArray] | None:
+) -> _Gathered | None:
     """Polish what a collocation that resolves all of it supplies; None beyond its reach."""
     ranks = sum(left.shape[1] for left, _ in system.factors)
 
@@ -213,7 +215,7 @@ def _collocated(
                 inside = values[(values.imag >= 0) & (np.abs(values) <= 1.1 * reach)]
             floor = float(inside.real.max()) - depth
         elif inside.size == 0:
-            return np.zeros(0, dtype=complex), np.zeros(0, dtype=bool)
+            return np.zeros(0, dtype=complex), np.zeros(0, dtype=bool), floor
         # Starting values of a k-fold root are off by the k-th root of the error.
         slack = _WIDE
         if depth == 0.0 and line is None:
@@ -229,14 +231,14 @@ def _collocated(
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
         if (done & ~strayed).all():
             order = np.argsort(-s.real, kind="stable")
-            return s[order], done[order]
+            return s[order], done[order], floor
         degree *= 2
     return None
 
 
 def _counted(
     system: DelaySystem, depth: float, line: float | None
-) -> tuple[ComplexArray, BoolArray]:
+) -> _Gathered:
     """Return roots that the argument principle has counted.
 
     Raises
@@ -246,8 +248,8 @@ def _counted(
     """
     climb = Climb(system, reduced(system))
     unit = 1.0 / system.max_delay if system.delays else 1.0
+    climb.ascend(_first_places(system))
     if line is None:
-        climb.ascend(_first_places(system))
         depth = max(min(depth, unit), 0.05 * unit)
     found = None
     for _ in range(20):
@@ -262,7 +264,7 @@ def _counted(
     if not done.all():
         raise climb.refuse(f"{int((~done).sum())} of {done.size} roots do not converge")
     order = np.argsort(-s.real, kind="stable")
-    return s[order], done[order]
+    return s[order], done[order], floor
 
 
 def _first_places(system: DelaySystem) -> ComplexArray:
@@ -279,13 +281,18 @@ def _first_places(system: DelaySystem) -> ComplexArray:
 def spectral_abscissa(system: DelaySystem) -> float:
     """Return the largest real part of the characteristic roots.
 
+    Raises
+    ------
+    UndecidedError
+        If the rightmost root cannot be found, or roots are counted right of it.
+
     Notes
     -----
     Where roots coincide to rounding the value is the real part of their centre; see
     `dominant_roots` for the spread.
     """
     system, unit = _in_own_units(system)
-    s, done = _gather(system, 0.0)
+    s, done, _ = _gather(system, 0.0)
     top = complex(s[0])
     isolated = s.size == 1 or (np.abs(top - s[1:]) > _CLOSE * (1.0 + abs(top))).all()
     if isolated and (top.imag == 0 or top.imag > _CLOSE):
@@ -296,12 +303,34 @@ def spectral_abscissa(system: DelaySystem) -> float:
 def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
     """Return the rightmost characteristic roots with imag ≥ 0, rightmost first.
 
-    Those within 1/τ of the spectral abscissa are given, with τ the largest delay, and all
-    of them where there is no delay.
+    Those within 1/τ of the spectral abscissa are given, with τ the largest delay, or nearer
+    to it if there are several hundred, and all of them where there is no delay.
+
+    Raises
+    ------
+    UndecidedError
+        If they cannot be told apart: it says what was tried.
+    """
+    return known_roots(system)[0]
+
+
+def known_roots(
+    system: DelaySystem, most: int | None = None
+) -> tuple[tuple[Root, ...], float]:
+    """Return `dominant_roots`, ``most`` at most, and a line that no others lie right of.
+
+    It lies 1/τ left of the spectral abscissa unless that would be too many roots.
     """
     system, unit = _in_own_units(system)
     depth = 1.0 / system.max_delay if system.delays else 1e300
-    return _slowed(_resolve(system, *_gather(system, depth)), unit)
+    s, done, floor = _gather(system, depth)
+    if most is not None and s.size > most:
+        # Cut where it is least likely to part a cluster.
+        half = most // 2
+        cut = half + int(np.argmax(s.real[half:most] - s.real[half + 1 : most + 1])) + 1
+        floor = max(floor, float(s.real[cut]))
+        s, done = s[:cut], done[:cut]
+    return _slowed(_resolve(system, s, done), unit), floor / unit
 
 
 def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ...]:
@@ -331,12 +360,14 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
     counted = count_right_of(system, line).count
     if counted is None:
         raise InputError("right_of", right_of, "another line: roots right of it cannot be counted")
+    if counted == 0:
+        return ()
     try:
         for gather in (_collocated, _counted):
             found = gather(system, 0.0, line)
             if found is None:
                 continue
-            roots = tuple(root for root in _resolve(system, *found) if root.rightmost >= line)
+            roots = tuple(root for root in _resolve(system, *found[:2]) if root.rightmost >= line)
             if _total(roots) == counted:
                 return _slowed(roots, unit)
     except UndecidedError as error:
@@ -385,7 +416,7 @@ def _resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Roo
         first = left[0]
         cluster = _cluster(system, s, first, left)
         if cluster is None:
-            members, root = [first], _simple_root(system, s, first, bool(done[first]))
+            members, root = [first], _simple_root(system, complex(s[first]), bool(done[first]))
         else:
             members, root = cluster
         roots.append(root)
@@ -411,23 +442,19 @@ def _smallest_singular(system: DelaySystem, s: ComplexArray) -> FloatArray:
     return np.asarray(values[..., -1])
 
 
-def _simple_root(system: DelaySystem, s: ComplexArray, index: int, converged: bool) -> Root:
-    value = s[index]
-    others = np.concatenate([np.delete(s, index), s[s.imag > 0].conj()])
-    gap = float(np.abs(others - value).min()) if others.size else 1.0
-    radius = min(0.1 * gap, 1e-4 * (1.0 + abs(value))) + 1e-12
-    ring = value + radius * _CIRCLE[::8]
+def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
+    delta, slope = characteristic.matrix_and_derivative(system, np.array(value))
+    left, sizes, right = np.linalg.svd(delta)
     weight = float(_weight(system, np.array([value]))[0])
-    condition = weight * radius / float(_smallest_singular(system, ring).min())
-    residual = float(_smallest_singular(system, np.array([value]))[0]) / weight
+    turn = abs(left[:, -1].conj() @ slope @ right[-1].conj())
     return Root(
         float(value.real),
         float(value.imag),
         1,
         0.0,
         float(value.real),
-        residual,
-        condition,
+        float(sizes[-1]) / weight,
+        weight / max(float(turn), 1e-300),
         converged,
     )
 
@@ -442,7 +469,7 @@ def _cluster(
     # Roots of a chain lie 2π/τ apart.
     close = _CLOSE * (1.0 + abs(s[first]))
     close = min(close, 2.0 / system.max_delay) if system.delays else close
-    near = int((np.abs(values - s[first]) < close).sum())
+    near = min(int((np.abs(values - s[first]) < close).sum()), _LARGEST_CLUSTER)
     for size in range(near, 1, -1):
         members = values[:size]
         centre = complex(members.mean())
@@ -461,6 +488,15 @@ def _cluster(
     return None
 
 
+def _change(
+    system: DelaySystem, centre: complex, tight: ComplexArray, ratio: ComplexArray
+) -> float:
+    """Return the relative change of the coefficients that makes members of a cluster one."""
+    at = centre + tight
+    sizes = _smallest_singular(system, at) / _weight(system, at)
+    return float((np.abs(1.0 - ratio) * sizes).max())
+
+
 def _multiple_root(
     system: DelaySystem, members: ComplexArray, centre: complex, radius: float
 ) -> Root | None:
@@ -470,6 +506,15 @@ def _multiple_root(
     which is analytic in the coefficients although the single roots are not.
     """
     size = members.size
+    offsets = members - members.mean()
+    spread = float(np.abs(offsets).max())
+    # Measured where the split is felt most: a circle just outside the members.
+    tight = max(2.0 * spread, 1e-6 * radius) * _CIRCLE
+    ratio = np.prod(tight[:, None] / (tight[:, None] - offsets[None, :]), axis=1)
+    # Most that are no multiple root show it at a single point, even if the centre is rough.
+    worst = [int(np.abs(1.0 - ratio).argmax())]
+    if _change(system, centre, tight[worst], ratio[worst]) > 1e3 * MULTIPLICITY_TOLERANCE:
+        return None
     ring = radius * _CIRCLE
     slope = characteristic.log_derivative(system, centre + ring)
     count = complex((slope * ring).mean())
@@ -479,13 +524,7 @@ def _multiple_root(
     if not abs(shift) < radius:
         return None
     refined = complex(centre.real + shift.real, centre.imag + shift.imag if centre.imag else 0.0)
-    offsets = members - members.mean()
-    spread = float(np.abs(offsets).max())
-    # Measured where the split is felt most: a circle just outside the members.
-    tight = max(2.0 * spread, 1e-6 * radius) * _CIRCLE
-    ratio = np.prod(tight[:, None] / (tight[:, None] - offsets[None, :]), axis=1)
-    sigma = _smallest_singular(system, refined + tight)
-    change = float((np.abs(1.0 - ratio) * sigma / _weight(system, refined + tight)).max())
+    change = _change(system, refined, tight, ratio)
     if change > MULTIPLICITY_TOLERANCE:
         return None
     outer = _smallest_singular(system, refined + ring)
