@@ -1,106 +1,142 @@
 """Scan along a parameter in which the characteristic equation is affine.
 
-δ0, ψ, ξ, κ, every gain and the rate of penetration enter f = a(s) + y b(s) that way. A root
-lies at s = σ + iω for a real y exactly where Im(a b*) = 0, and then y = −Re(a b*)/|b|²; the
-real root s = σ gives one more y. Frequencies are found on a grid that resolves exp(−sτ)
-and the resonances of a and b, up to the bound beyond which no root can lie.
+δ0, ψ, ξ, κ, every gain and the rate of penetration enter det Δ = a(s) + t b(s) that way, with t
+from 0 to 1 over the range. A root lies at s = σ + iω for a real t exactly where Im(a b*) = 0,
+and then t = −Re(a b*)/|b|²; the real root s = σ gives one more t. Frequencies are found on a
+grid that resolves exp(−sτ) and the resonances of a and b, up to the bound beyond which no root
+can lie.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.charts.counting_scan import LoopMatrices, Matrices, count_right
 from drillctrl.charts.scan import ScanLine
-from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
+from drillctrl.delay.reduced import ReducedLoops, reduced_matrices
+from drillctrl.spectrum.characteristic import perron_bounds
 
 _PHASE_STEP = 0.4
-_LARGEST_TURN = 1.0
 _CHUNK = 400_000
+# Turn of a and b from one frequency to the next on the lines that shape the grid.
+_GRID_TURN = 1.0
+_GRID_LINES = 3
+_GRID_ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class AffineLoops:
-    """f = a + y b for many lines at once.
+    """det Δ = a + t b for many lines at once.
 
     Attributes
     ----------
-    a, b : Quasipolynomials
-        Coefficients at y = 0 and per unit of y, with common delays.
+    low, high : ReducedLoops
+        The loops at t = 0 and at t = 1.
     reach : array, (N,)
-        No root right of the line has |s| above this, for any y in the range.
+        No root right of the line has |s| above this, for any t in [0, 1].
     """
 
-    a: Quasipolynomials
-    b: Quasipolynomials
+    low: ReducedLoops
+    high: ReducedLoops
     reach: FloatArray
+
+    @property
+    def delays(self) -> FloatArray:
+        """τ of each line, 0 if nothing is delayed."""
+        return np.asarray(self.low.delays.max(axis=1, initial=0.0))
 
     def take(self, index: np.ndarray) -> AffineLoops:
         """Return the lines at the given places."""
-        return AffineLoops(self.a.take(index), self.b.take(index), self.reach[index])
+        return AffineLoops(self.low.take(index), self.high.take(index), self.reach[index])
 
-    def values(
+    def values(self, omega: FloatArray, line: float) -> tuple[ComplexArray, ComplexArray]:
+        """Return a and b at s = line + iω, each of the shape of ``omega``.
+
+        Both are divided by the same positive number at each point, lest they overflow.
+        """
+        a, _, b, _ = self._evaluated(omega, line, with_slope=False)
+        return a, b
+
+    def values_and_slopes(
         self, omega: FloatArray, line: float
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Return a, b and da/ds, db/ds at s = line + iω, each of the shape of ``omega``.
+        """Return a, da/ds, b and db/ds likewise."""
+        return self._evaluated(omega, line, with_slope=True)
 
-        All are multiplied by exp(rστ) where σ < 0, so that nothing overflows.
-        """
-        s = line + 1j * omega
-        delays = self.a.delays.reshape(-1, *[1] * (s.ndim - 1))
-        degree = self.a.coefficients.shape[2] - 1
-        top = degree if line < 0.0 else 0
-        e = np.exp(-1j * omega * delays)
-        results = []
-        for part in (self.a, self.b):
-            p, slope = part.polynomials(s)
-            value = np.zeros(s.shape, dtype=complex)
-            derivative = np.zeros(s.shape, dtype=complex)
-            power = np.ones(s.shape, dtype=complex)
-            for k in range(degree + 1):
-                weight = np.exp((top - k) * line * delays) * power
-                value += p[k] * weight
-                derivative += (slope[k] - k * delays * p[k]) * weight
-                power = power * e
-            results += [value, derivative]
-        return results[0], results[2], results[1], results[3]
+    def _evaluated(
+        self, omega: FloatArray, line: float, *, with_slope: bool
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        s = (line + 1j * omega).reshape(len(omega), -1)
+        ends = [end.evaluate(s, with_slope=with_slope) for end in (self.low, self.high)]
+        scale = np.maximum(ends[0][1], ends[1][1])
+        scale = np.where(np.isfinite(scale), scale, 0.0)
+        a, last = (sign * np.exp(size - scale) for sign, size, _ in ends)
+        slope_a, slope_last = a * ends[0][2], last * ends[1][2]
+        parts = (a, slope_a, last - a, slope_last - slope_a)
+        first, second, third, fourth = (part.reshape(omega.shape) for part in parts)
+        return first, second, third, fourth
+
+
+def affine_loops(start: LoopMatrices, stop: LoopMatrices, line: float = 0.0) -> AffineLoops:
+    """Return the lines between loops at either end.
+
+    Parameters
+    ----------
+    start, stop : tuple of array
+        A0 (N, n, n), A1 (N, n, n) and τ (N,) at t = 0 and at t = 1.
+    line : float
+        σ, for the bound on the roots.
+    """
+    # Entries are affine in t, so the larger end bounds them in between.
+    reach = perron_bounds(
+        np.maximum(np.abs(start[0]), np.abs(stop[0])),
+        np.maximum(np.abs(start[1]), np.abs(stop[1])),
+        start[2],
+        line,
+    )
+    return AffineLoops(reduced_matrices(*start), reduced_matrices(*stop), reach)
 
 
 def frequency_grid(loops: AffineLoops, line: float) -> FloatArray:
     """Return frequencies that resolve every line of a group, shape (G,)."""
-    order = loops.a.coefficients.shape[1] - 1
-    top = float(loops.reach.max()) / math.sin(math.pi / (2 * order)) * 1.001
     inner = float(loops.reach.max()) * 1.001
-    spacing = min(_PHASE_STEP / max(float(loops.a.delays.max()), 1e-9), inner / 100.0)
-    grids = [np.linspace(0.0, inner, 2 + int(inner / spacing))]
-    # Beyond the roots only the argument is followed, and it is nearly that of s^n.
-    grids.append(np.linspace(inner, top, 2 + int((top - inner) / (2 * spacing))))
-    fan = np.tan(np.linspace(-1.45, 1.45, 25))
-    for part in (loops.a, loops.b):
-        for c in part.coefficients[:: max(1, part.coefficients.shape[0] // 3)]:
-            for column in c.T:
-                if np.count_nonzero(column) < 2:
-                    continue
-                for root in np.roots(np.trim_zeros(column, "b")[::-1]):
-                    width = max(abs(root.real - line), 1e-6)
-                    if 0.0 < root.imag < inner and width < 3 * spacing:
-                        grids.append(root.imag + width * fan)
-    grid = np.concatenate(grids)
-    return np.unique(grid[(grid >= 0.0) & (grid <= top)])
+    spacing = min(_PHASE_STEP / max(float(loops.delays.max()), 1e-9), inner / 100.0)
+    grid = np.linspace(0.0, inner, 2 + int(inner / spacing))
+    some = loops.take(np.unique(np.linspace(0, loops.reach.size - 1, _GRID_LINES).astype(int)))
+    turn = _turns(some, grid, line)
+    for _ in range(_GRID_ROUNDS):
+        width = np.diff(grid)
+        size = width * np.maximum(turn[:, 1:], turn[:, :-1]).max(axis=0)
+        coarse = np.flatnonzero((size > _GRID_TURN) & (width > 1e-9 * inner))
+        if not coarse.size:
+            break
+        middle = 0.5 * (grid[coarse] + grid[coarse + 1])
+        turn = np.insert(turn, coarse + 1, _turns(some, middle, line), axis=1)
+        grid = np.insert(grid, coarse + 1, middle)
+    return grid
+
+
+def _turns(loops: AffineLoops, grid: FloatArray, line: float) -> FloatArray:
+    """Return how fast a and b turn along the line, the faster of them."""
+    omega = np.broadcast_to(grid, (loops.reach.size, grid.size))
+    a, slope_a, b, slope_b = loops.values_and_slopes(omega, line)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fast = np.fmax(np.abs(slope_a / a), np.abs(slope_b / b))
+    return np.asarray(np.nan_to_num(fast, nan=0.0, posinf=0.0))
 
 
 def scan_affine(
-    loops: AffineLoops, positions: FloatArray, low: float, high: float, line: float = 0.0
+    matrices: Matrices, positions: FloatArray, low: float, high: float, line: float = 0.0
 ) -> list[ScanLine]:
     """Scan many lines along the affine parameter.
 
     Parameters
     ----------
-    loops : AffineLoops
-        One for each line.
+    matrices : callable
+        Returns A0, A1 and τ at (positions, places along the lines).
     positions : array, (N,)
         The parameter that is held.
     low, high : float
@@ -108,65 +144,44 @@ def scan_affine(
     line : float
         σ: roots right of it are counted.
     """
-    result: list[ScanLine | None] = [None] * positions.size
+    ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
+    loops = affine_loops(*ends, line)
+    found = [np.zeros(0)] * 4
     # Lines with similar delays share a grid.
-    group = np.floor(2.0 * np.log2(np.maximum(loops.a.delays, 1e-6))).astype(int)
+    group = np.floor(2.0 * np.log2(np.maximum(loops.delays, 1e-6))).astype(int)
     for key in np.unique(group):
         members = np.flatnonzero(group == key)
         grid = frequency_grid(loops.take(members), line)
         for part in np.array_split(members, max(1, members.size * grid.size // _CHUNK)):
-            scanned = _scan_group(loops.take(part), positions[part], low, high, line, grid)
-            for index, scan in zip(part, scanned, strict=True):
-                result[index] = scan
-    return [scan for scan in result if scan is not None]
-
-
-def _scan_group(
-    loops: AffineLoops,
-    positions: FloatArray,
-    low: float,
-    high: float,
-    line: float,
-    grid: FloatArray,
-) -> list[ScanLine]:
-    count = positions.size
-    omega = np.broadcast_to(grid, (count, grid.size))
-    a, b, _, _ = loops.values(omega, line)
-    rows, frequency = _zeros(loops, a * b.conj(), grid, line, low, high)
-    at, jump = _crossings(loops, rows, frequency, line)
-    # A real root at s = σ: one root changes sides, not a pair.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        real = -(a[:, 0] / b[:, 0]).real
-    crossing = np.flatnonzero(np.isfinite(real))
-    _, real_jump = _crossings(loops, crossing, np.zeros(crossing.size), line, real[crossing])
-    rows = np.concatenate([rows, crossing])
-    frequency = np.concatenate([frequency, np.zeros(crossing.size)])
-    at, jump = np.concatenate([at, real[crossing]]), np.concatenate([jump, real_jump // 2])
-    inside = (at > low) & (at < high) & (jump != 0)
-    rows, frequency, at, jump = rows[inside], frequency[inside], at[inside], jump[inside]
-    order = np.lexsort((at, rows))
-    rows, frequency, at, jump = rows[order], frequency[order], at[order], jump[order]
-    bounds = np.searchsorted(rows, np.arange(count + 1))
-    parts = [slice(bounds[i], bounds[i + 1]) for i in range(count)]
+            rows, *rest = _scan_group(loops.take(part), line, grid)
+            new = (part[rows], *rest)
+            found = [np.concatenate(pair) for pair in zip(found, new, strict=True)]
+    rows, frequency, t, jump = found
+    inside = (t > 0.0) & (t < 1.0) & (jump != 0)
+    rows, frequency, t, jump = rows[inside], frequency[inside], t[inside], jump[inside]
+    order = np.lexsort((t, rows))
+    rows, frequency, t = rows[order], frequency[order], t[order]
+    jump = jump[order].astype(np.int64)
+    bounds = np.searchsorted(rows, np.arange(positions.size + 1))
+    parts = [slice(bounds[i], bounds[i + 1]) for i in range(positions.size)]
     # Count where the roots are farthest from the line: amid the widest gap.
-    probes = np.empty(count)
-    places = np.empty(count, dtype=int)
+    probes = np.empty(positions.size)
+    places = np.empty(positions.size, dtype=int)
     for i, part in enumerate(parts):
-        edges = np.concatenate([[low], at[part], [high]])
+        edges = np.concatenate([[0.0], t[part], [1.0]])
         places[i] = int(np.argmax(np.diff(edges)))
         probes[i] = 0.5 * (edges[places[i]] + edges[places[i] + 1])
-    known = count_roots(loops, a + probes[:, None] * b, probes, grid, line)
+    known = count_right(matrices(positions, low + probes * (high - low)), line)
     lines = []
     for i, part in enumerate(parts):
         steps = np.concatenate([[0], np.cumsum(jump[part])])
-        counts = known[i] + steps - steps[places[i]]
         lines.append(
             ScanLine(
                 float(positions[i]),
-                at[part],
+                low + t[part] * (high - low),
                 frequency[part],
                 jump[part],
-                counts,
+                known[i] + steps - steps[places[i]],
                 low,
                 high,
                 low,
@@ -176,13 +191,32 @@ def _scan_group(
     return lines
 
 
+def _scan_group(
+    loops: AffineLoops, line: float, grid: FloatArray
+) -> tuple[np.ndarray, FloatArray, FloatArray, np.ndarray]:
+    """Return (line, ω, t, change of the count) of every crossing."""
+    count = loops.reach.size
+    a, b = loops.values(np.broadcast_to(grid, (count, grid.size)), line)
+    rows, frequency = _zeros(loops, a * b.conj(), grid, line)
+    at, jump = _crossings(loops, rows, frequency, line)
+    # A real root at s = σ: one root changes sides, not a pair.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        real = -(a[:, 0] / b[:, 0]).real
+    crossing = np.flatnonzero(np.isfinite(real))
+    _, real_jump = _crossings(loops, crossing, np.zeros(crossing.size), line, real[crossing])
+    return (
+        np.concatenate([rows, crossing]),
+        np.concatenate([frequency, np.zeros(crossing.size)]),
+        np.concatenate([at, real[crossing]]),
+        np.concatenate([jump, real_jump // 2]),
+    )
+
+
 def _zeros(
     loops: AffineLoops,
     product: ComplexArray,
     grid: FloatArray,
     line: float,
-    low: float,
-    high: float,
 ) -> tuple[np.ndarray, FloatArray]:
     """Find the sign changes of Im(a b*) in ω > 0; return (row, ω)."""
     g = product.imag
@@ -201,7 +235,7 @@ def _zeros(
     chosen = loops.take(rows)
 
     def evaluate(omega: FloatArray, index: np.ndarray) -> FloatArray:
-        a, b, _, _ = chosen.take(index).values(omega, line)
+        a, b = chosen.take(index).values(omega, line)
         return np.asarray((a * b.conj()).imag)
 
     everyone = np.arange(rows.size)
@@ -234,7 +268,7 @@ def _zeros(
 
 def _near_zero(loops: AffineLoops, grid: FloatArray, line: float) -> FloatArray:
     omega = np.full(loops.reach.size, 1e-3 * grid[1])
-    a, b, _, _ = loops.values(omega, line)
+    a, b = loops.values(omega, line)
     return np.asarray((a * b.conj()).imag)
 
 
@@ -266,7 +300,7 @@ def _dips(
     rows, vertex, x0, x2, y1 = rows[look], vertex[look], x0[look], x2[look], y1[look]
     if not rows.size:
         return empty
-    a, b, _, _ = loops.take(rows).values(vertex, line)
+    a, b = loops.take(rows).values(vertex, line)
     value = (a * b.conj()).imag
     hit = (np.signbit(value) != np.signbit(y1)) & (vertex > x0) & (vertex < x2)
     rows, vertex, x0, x2, sign = rows[hit], vertex[hit], x0[hit], x2[hit], np.signbit(y1[hit])
@@ -285,81 +319,10 @@ def _crossings(
     line: float,
     at: FloatArray | None = None,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return y and the change of the count (±2 for a pair) at each crossing."""
-    a, b, slope_a, slope_b = loops.take(rows).values(omega, line)
+    """Return t and the change of the count (±2 for a pair) at each crossing."""
+    a, slope_a, b, slope_b = loops.take(rows).values_and_slopes(omega, line)
     with np.errstate(divide="ignore", invalid="ignore"):
-        y = -(a * b.conj()).real / np.abs(b) ** 2 if at is None else at
-        motion = (-b / (slope_a + y * slope_b)).real
+        t = -(a * b.conj()).real / np.abs(b) ** 2 if at is None else at
+        motion = (-b / (slope_a + t * slope_b)).real
     jump = np.where(np.isfinite(motion), 2 * np.sign(motion), 0).astype(np.int64)
-    return np.asarray(np.nan_to_num(y, nan=np.inf)), jump
-
-
-def count_roots(
-    loops: AffineLoops, f: ComplexArray, probes: FloatArray, grid: FloatArray, line: float
-) -> np.ndarray:
-    """Count the roots right of the line at y = probes by the argument principle."""
-    order = loops.a.coefficients.shape[1] - 1
-    turn = np.angle(f[:, 1:] / f[:, :-1])
-    total = turn.sum(axis=1)
-    rows, columns = np.nonzero(np.abs(turn) > _LARGEST_TURN)
-    np.subtract.at(total, rows, turn[rows, columns])
-    left, right = grid[columns], grid[columns + 1]
-    f_left, f_right = f[rows, columns], f[rows, columns + 1]
-    for _ in range(40):
-        if not rows.size:
-            break
-        middle = 0.5 * (left + right)
-        a, b, _, _ = loops.take(rows).values(middle, line)
-        between = a + probes[rows] * b
-        first, second = np.angle(between / f_left), np.angle(f_right / between)
-        good = np.maximum(np.abs(first), np.abs(second)) <= _LARGEST_TURN
-        np.add.at(total, rows[good], (first + second)[good])
-        bad = ~good
-        rows = np.concatenate([rows[bad], rows[bad]])
-        left, right, middle = left[bad], right[bad], middle[bad]
-        f_left = np.concatenate([f_left[bad], between[bad]])
-        f_right = np.concatenate([between[bad], f_right[bad]])
-        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-    end = line + 1j * grid[-1]
-    scale = np.exp(1j * order * np.angle(end))
-    rest = order * (math.pi / 2 - np.angle(end)) - np.angle(f[:, -1] / scale)
-    return np.asarray(np.rint(order / 2 - (total + rest) / math.pi).astype(np.int64))
-
-
-def affine_loops(
-    start: tuple[FloatArray, FloatArray, FloatArray],
-    stop: tuple[FloatArray, FloatArray, FloatArray],
-    low: float,
-    high: float,
-    line: float = 0.0,
-) -> AffineLoops:
-    """Return f = a + y b from the matrices at both ends of the range of y.
-
-    Parameters
-    ----------
-    start, stop : tuple of array
-        A0 (N, n, n), A1 (N, n, n) and τ (N,) at y = low and at y = high.
-    low, high : float
-        The range of y.
-    line : float
-        σ, for the bound on the roots.
-    """
-    at_low, at_high = from_matrices(*start), from_matrices(*stop)
-    size = max(at_low.coefficients.shape[2], at_high.coefficients.shape[2])
-    first, last = (
-        np.pad(q.coefficients, ((0, 0), (0, 0), (0, size - q.coefficients.shape[2])))
-        for q in (at_low, at_high)
-    )
-    slope = (last - first) / (high - low)
-    slope[np.abs(slope) <= 1e-13 * np.abs(last).max(axis=(1, 2), keepdims=True)] = 0.0
-    # Entries are affine in y, so the larger end bounds them in between.
-    reach = perron_bounds(
-        np.maximum(np.abs(start[0]), np.abs(stop[0])),
-        np.maximum(np.abs(start[1]), np.abs(stop[1])),
-        start[2],
-        line,
-    )
-    delays = at_low.delays
-    return AffineLoops(
-        Quasipolynomials(first - low * slope, delays), Quasipolynomials(slope, delays), reach
-    )
+    return np.asarray(np.nan_to_num(t, nan=np.inf)), jump

@@ -11,23 +11,19 @@ from collections.abc import Callable
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.charts.affine_scan import AffineLoops, count_roots, frequency_grid
+from drillctrl.base.errors import UndecidedError
 from drillctrl.charts.scan import IntArray, ScanLine
-from drillctrl.spectrum.quasipolynomial import Quasipolynomials, from_matrices, perron_bounds
+from drillctrl.delay.reduced import ReducedLoops, reduced_matrices
+from drillctrl.spectrum.characteristic import perron_bounds
+from drillctrl.spectrum.count import UNDECIDED, count_many, follow, is_small
 
-Matrices = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+LoopMatrices = tuple[FloatArray, FloatArray, FloatArray]
+Matrices = Callable[[FloatArray, FloatArray], LoopMatrices]
 _SAMPLES = 65
 _HALVINGS = 34
-_CHUNK = 400_000
 
 
-def _constant(matrices: tuple[FloatArray, FloatArray, FloatArray], line: float) -> AffineLoops:
-    loops = from_matrices(*matrices)
-    nothing = Quasipolynomials(np.zeros_like(loops.coefficients), loops.delays)
-    return AffineLoops(loops, nothing, perron_bounds(*matrices, line))
-
-
-def count_right(matrices: tuple[FloatArray, FloatArray, FloatArray], line: float) -> IntArray:
+def count_right(matrices: LoopMatrices, line: float) -> IntArray:
     """Count the roots right of Re s = ``line`` of N loops by the argument principle.
 
     Parameters
@@ -36,20 +32,31 @@ def count_right(matrices: tuple[FloatArray, FloatArray, FloatArray], line: float
         A0 (N, n, n), A1 (N, n, n) and τ (N,).
     line : float
         σ.
+
+    Raises
+    ------
+    UndecidedError
+        If roots of a loop cannot be counted.
     """
-    loops = _constant(matrices, line)
-    counts = np.zeros(loops.reach.size, dtype=np.int64)
-    # Loops with similar delays and reach share a grid.
-    scale = np.maximum(loops.a.delays, 1e-6)
-    group = np.floor(2 * np.log2(scale)) * 1000 + np.floor(2 * np.log2(loops.reach))
-    for key in np.unique(group):
-        members = np.flatnonzero(group == key)
-        grid = frequency_grid(loops.take(members), line)
-        for part in np.array_split(members, max(1, members.size * grid.size // _CHUNK)):
-            some = loops.take(part)
-            f = some.values(np.broadcast_to(grid, (part.size, grid.size)), line)[0]
-            counts[part] = count_roots(some, f, np.zeros(part.size), grid, line)
+    loops, bounds = _reduced(matrices, line)
+    counts = count_many(loops, line, bounds)
+    # A root on the line to rounding lies on one side of a line beside it.
+    for share in (1e-11, 1e-9, 1e-7):
+        left = np.flatnonzero(counts == UNDECIDED)
+        if left.size:
+            shift = share * float(bounds[left].min())
+            counts[left] = count_many(loops.take(left), line + shift, bounds[left])
+    if (counts == UNDECIDED).any():
+        raise UndecidedError("level", line, "one that no root lies on over whole lines")
     return counts
+
+
+def _reduced(matrices: LoopMatrices, line: float) -> tuple[ReducedLoops, FloatArray]:
+    """Return the loops and the bounds on their roots."""
+    bounds = perron_bounds(*matrices, line)
+    turns = float((bounds * matrices[2]).max(initial=0.0))
+    plain = is_small(matrices[0].shape[-1], turns)
+    return reduced_matrices(*matrices, plain=plain), bounds
 
 
 def scan_counting(
@@ -105,20 +112,21 @@ def scan_counting(
     return lines
 
 
-def _frequencies(matrices: tuple[FloatArray, FloatArray, FloatArray], line: float) -> FloatArray:
+def _frequencies(matrices: LoopMatrices, line: float) -> FloatArray:
     """Return |Im s| of the root nearest to the line for each loop."""
-    loops = _constant(matrices, line)
-    result = np.empty(loops.reach.size)
-    for i in range(result.size):
-        one = loops.take(np.array([i]))
-        grid = frequency_grid(one, line)
-        f, _, slope, _ = one.values(grid[None, :], line)
-        start = int(np.argmin(np.abs(f[0] / slope[0])))
-        omega = float(grid[start])
+    loops, bounds = _reduced(matrices, line)
+    result = np.zeros(loops.count)
+    for i, bound in enumerate(bounds.tolist()):
+        one = loops.take(slice(i, i + 1))
+        seen = follow(one, line, bound)
+        speed = np.where(np.isfinite(seen.slope), np.abs(seen.slope), np.inf)
+        omega = float(seen.omega[int(np.argmax(speed))])
         for _ in range(20):
-            f, _, slope, _ = one.values(np.array([[omega]]), line)
+            slope = complex(one.evaluate(np.array([[line + 1j * omega]]))[2][0, 0])
+            if not np.isfinite(slope):
+                break
             # The root lies on the line, so only the step along it is taken.
-            step = float((f / slope).imag[0, 0])
+            step = (1.0 / slope).imag
             omega -= step
             if abs(step) < 1e-12 * (1.0 + omega):
                 break

@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.charts.affine_scan import affine_loops, scan_affine
+from drillctrl.charts.affine_scan import scan_affine
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.counting_scan import scan_counting
 from drillctrl.charts.delay_scan import scan_rotary_speed
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine, Scanner
-from drillctrl.spectrum.quasipolynomial import from_matrices
+from drillctrl.delay.reduced import reduced_matrices
+from drillctrl.spectrum.characteristic import perron_bounds
 
 _SHORTEST_DELAY_SHARE = 1e-3
+_PLACES = np.exp(1j * np.array([0.2, 0.9, 1.5, 1.8])) * np.array([1.0, 0.4, 0.1, 0.7])
 
 
 def _transposed(plane: Plane, rows: bool) -> Any:
@@ -31,12 +33,19 @@ def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
         return False
     matrices = _transposed(plane, rows)
     t = held.low + held.span * np.array([0.31, 0.83])
-    tables = []
+    signs, sizes = [], []
     for share in (0.0, 0.37, 1.0):
-        loops = from_matrices(*matrices(t, np.full(2, scanned.low + share * scanned.span)))
-        tables.append(np.pad(loops.coefficients, ((0, 0), (0, 0), (0, 4)))[:, :, :4])
-    middle = tables[0] + 0.37 * (tables[2] - tables[0])
-    return bool(np.abs(middle - tables[1]).max() <= 1e-9 * np.abs(tables[1]).max())
+        A0, A1, delays = matrices(t, np.full(2, scanned.low + share * scanned.span))
+        # The same places for all three, of the size of the roots.
+        if not signs:
+            s = perron_bounds(A0, A1, delays, 0.0)[:, None] * _PLACES
+        sign, size = reduced_matrices(A0, A1, delays, plain=True).determinant(s)
+        signs.append(sign)
+        sizes.append(size)
+    scale = np.max(sizes, axis=0)
+    values = [sign * np.exp(size - scale) for sign, size in zip(signs, sizes, strict=True)]
+    middle = values[0] + 0.37 * (values[2] - values[0])
+    return bool(np.abs(middle - values[1]).max() <= 1e-9)
 
 
 def _moves_delay_alone(plane: Plane, scanned: Axis, *, rows: bool) -> bool:
@@ -68,20 +77,17 @@ def _delay_scanner(plane: Plane, scanned: Axis, *, rows: bool) -> Scanner:
     turn = 2.0 * np.pi / point.blades
 
     def scan(positions: FloatArray) -> list[ScanLine]:
-        loops = from_matrices(*matrices(positions, np.full(positions.size, scanned.high)))
-        return scan_rotary_speed(loops, positions, scanned.low, scanned.high, turn)
+        A0, A1, _ = matrices(positions, np.full(positions.size, scanned.high))
+        return scan_rotary_speed(A0, A1, positions, scanned.low, scanned.high, turn)
 
     return scan
 
 
 def _affine_scanner(plane: Plane, scanned: Axis, level: float, *, rows: bool) -> Scanner:
     matrices = _transposed(plane, rows)
-    low, high = scanned.low, scanned.high
 
     def scan(positions: FloatArray) -> list[ScanLine]:
-        ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
-        loops = affine_loops(ends[0], ends[1], low, high, level)
-        return scan_affine(loops, positions, low, high, level)
+        return scan_affine(matrices, positions, scanned.low, scanned.high, level)
 
     return scan
 

@@ -66,7 +66,7 @@ class ReducedLoops:
         """Number of states, n."""
         return int(self.A0.shape[-1])
 
-    def take(self, index: npt.NDArray[np.intp]) -> ReducedLoops:
+    def take(self, index: npt.NDArray[np.intp] | slice) -> ReducedLoops:
         """Return the loops at the given places."""
         return ReducedLoops(
             self.A0[index],
@@ -78,12 +78,18 @@ class ReducedLoops:
             self.residues[index],
         )
 
+    @property
+    def _is_plain(self) -> bool:
+        return self.residues.shape[2] == 0
+
     def matrices(self, s: ComplexArray) -> ComplexArray:
         """Return Δ(s) of each loop at its own points, (N, G) → (N, G, n, n)."""
-        late = self.left[:, None] * _late(self.delays[:, None], s)[:, :, None, :]
-        delta = -(late @ self.right[:, None]) - self.A0[:, None]
-        index = np.arange(self.order)
-        delta[..., index, index] += s[..., None]
+        return self._matrices(s, _late(self.delays, s))
+
+    def _matrices(self, s: ComplexArray, late: ComplexArray) -> ComplexArray:
+        delta = (self.left[:, None] * -late[:, :, None, :]) @ self.right[:, None]
+        delta -= self.A0[:, None]
+        delta.reshape(*s.shape, -1)[..., :: self.order + 1] += s[..., None]
         return np.asarray(delta)
 
     def determinant(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
@@ -109,11 +115,13 @@ class ReducedLoops:
 
         Memory is bounded: points are taken in chunks.
         """
+        width = max(self.order, self.residues.shape[2]) + 1
+        if self._is_plain or np.isnan(self.factor).any():
+            width = 4 * self.order**2
+        if s.size * width <= _CHUNK:
+            return self._evaluate(s, with_slope)
         sign = np.empty(s.shape, dtype=complex)
         size, slope = np.empty(s.shape), np.zeros(s.shape, dtype=complex)
-        width = max(self.order, self.residues.shape[2]) + 1
-        if np.isnan(self.factor).any():
-            width = 4 * self.order**2
         columns = max(1, _CHUNK // width)
         rows = max(1, columns // max(1, s.shape[1]))
         for first in range(0, s.shape[0], rows):
@@ -127,7 +135,7 @@ class ReducedLoops:
     def _evaluate(
         self, s: ComplexArray, with_slope: bool
     ) -> tuple[ComplexArray, FloatArray, ComplexArray]:
-        if np.isnan(self.factor).all():
+        if self._is_plain:
             return self._dense(s, with_slope)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             weights = 1.0 / (s[..., None] - self.poles[:, None])
@@ -137,7 +145,7 @@ class ReducedLoops:
             rank = self.right.shape[1]
             grid = (*s.shape, rank, rank)
             gain = (weights @ self.residues).reshape(grid)
-            late = _late(self.delays[:, None], s)
+            late = _late(self.delays, s)
             turned = (late - self.factor[:, None, None])[..., None] * gain
             slope = np.zeros(s.shape, dtype=complex)
             change = None
@@ -164,26 +172,26 @@ class ReducedLoops:
         self, s: ComplexArray, with_slope: bool
     ) -> tuple[ComplexArray, FloatArray, ComplexArray]:
         """Do the same with Δ itself."""
-        delta = self.matrices(s)
+        late = _late(self.delays, s)
+        delta = self._matrices(s, late)
         sign, size = np.linalg.slogdet(delta)
-        slope = np.zeros(s.shape, dtype=complex)
-        if with_slope:
-            late = self.delays[:, None] * _late(self.delays[:, None], s)
-            change = (self.left[:, None] * late[:, :, None, :]) @ self.right[:, None]
-            index = np.arange(self.order)
-            change[..., index, index] += 1.0
-            singular = ~(np.isfinite(size) & np.isfinite(sign) & (sign != 0))
+        if not with_slope:
+            return sign, size, np.zeros(s.shape, dtype=complex)
+        late *= self.delays[:, None]
+        change = (self.left[:, None] * late[:, :, None, :]) @ self.right[:, None]
+        change.reshape(*s.shape, -1)[..., :: self.order + 1] += 1.0
+        singular = ~np.isfinite(size)
+        if singular.any():
             delta[singular] = np.eye(self.order)
-            with np.errstate(over="ignore", invalid="ignore"):
-                inverse = np.linalg.inv(delta)
-                slope = np.einsum("ngij,ngji->ng", inverse, change)
-            slope[singular] = np.nan
+        with np.errstate(over="ignore", invalid="ignore"):
+            slope = np.einsum("ngij,ngji->ng", np.linalg.inv(delta), change)
+        slope[singular] = np.nan
         return sign, size, slope
 
 
 def _late(delays: FloatArray, s: ComplexArray) -> ComplexArray:
-    """Return exp(−sτ), (N, 1, r) and (N, G) → (N, G, r)."""
-    exponent = -delays * s[..., None]
+    """Return exp(−sτ), (N, r) and (N, G) → (N, G, r)."""
+    exponent = -delays[:, None] * s[..., None]
     np.minimum(exponent.real, _EXPONENT_LIMIT, out=exponent.real)
     return np.asarray(np.exp(exponent))
 
@@ -244,12 +252,18 @@ def reduced_matrices(
     A0: FloatArray, A1: FloatArray, delays: FloatArray, *, plain: bool = False
 ) -> ReducedLoops:
     """Return N loops X' = A0 X + A1 X(t − τ), (N, n, n), (N, n, n) and (N,)."""
-    left, sizes, right = np.linalg.svd(A1)
-    floor = A1.shape[-1] * np.finfo(float).eps * sizes[:, :1]
-    rank = int((sizes > floor).sum(axis=1).max(initial=0))
-    left = left[:, :, :rank] * sizes[:, None, :rank]
+    left, right = common_factors(A1)
+    rank = right.shape[1]
     late = np.repeat(np.asarray(delays, dtype=float)[:, None], rank, axis=1)
-    return reduced_loops(A0, left, right[:, :rank], late, plain=plain)
+    return reduced_loops(A0, left, right, late, plain=plain)
+
+
+def common_factors(matrices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return L (N, n, r) and R (N, r, n) of N matrices, with r the largest rank among them."""
+    left, sizes, right = np.linalg.svd(matrices)
+    floor = matrices.shape[-1] * np.finfo(float).eps * sizes[:, :1]
+    rank = int((sizes > floor).sum(axis=1).max(initial=0))
+    return left[:, :, :rank] * sizes[:, None, :rank], right[:, :rank]
 
 
 def reduced_loops(

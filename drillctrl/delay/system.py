@@ -156,7 +156,6 @@ class DelaySystem:
             self.output_names,
         )
 
-
     def balanced(self) -> DelaySystem:
         """Return the system with its states scaled so that the matrices' norms are small.
 

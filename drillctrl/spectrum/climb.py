@@ -127,9 +127,7 @@ class Climb:
             group = np.arange(i, last)
             group = group[alive[group]]
             close = np.abs(every[group] - every[i]) <= np.maximum(near[group], near[i])
-            close |= np.abs(every[group] - every[i].conjugate()) <= np.maximum(
-                near[group], near[i]
-            )
+            close |= np.abs(every[group] - every[i].conjugate()) <= np.maximum(near[group], near[i])
             same = group[close]
             alive[same] = False
             kept.append(int(same[np.argmin(error[same])]))

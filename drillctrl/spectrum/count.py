@@ -10,19 +10,24 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.characteristic import magnitude_bound
 
+IntArray = npt.NDArray[np.int64]
 _LARGEST_STEP = 1.2
 _LARGEST_SURPRISE = 0.5
 _MAX_POINTS = 400_000
+_TOGETHER = 20_000
+# What stands for no count in an array of counts.
+UNDECIDED = -1
 # Up to so many states and bound · τ Δ itself costs less than its reduction.
 _SMALL, _FEW_TURNS = 6, 150.0
-# More states are followed to so many times the bound: the end then costs no eigenvalues.
-_FAR = 4.0
+# The line is followed to so many times the bound, where the end costs no eigenvalues.
+_NEAR, _FAR = 2.1, 4.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
 
     Where the modulus of s exceeds k times the Perron bound all eigenvalues μ of
     (A0 + Σ Ai e^(−sτi))/s lie in a disc of radius 1/k, so each factor 1 − μ of det Δ(s)/sⁿ
-    stays in the right half-plane and the contour closes at infinity without further
+    turns by less than asin (1/k) and the contour closes at infinity without further
     evaluation. Below, steps are halved until the logarithmic derivative of det Δ, at both
     ends, limits the turn, and the turn is what it predicts. Roots close to the line, several
     of them too, make the derivative large on either side and so cannot slip through between
@@ -106,63 +111,145 @@ def follow(loops: ReducedLoops, line: float, bound: float) -> Followed:
     bound : float
         What |s| of roots right of the line does not exceed: a Perron root.
     """
-    bound = bound * 1.001 + 1e-9
-    n, turns = loops.order, bound * float(loops.delays.max(initial=0.0))
-    if not turns < 0.5 * _MAX_POINTS:
-        return Followed(RootCount(line, None, bound, 0), np.zeros(0), np.zeros(0, complex))
-    small = n <= _SMALL
+    limit = np.array([bound * 1.001 + 1e-9])
+    traced = _traced(loops, line, limit)
+    whole = _counts(loops, line, traced)[0]
+    count = None if whole == UNDECIDED else int(whole)
+    result = RootCount(line, count, float(limit[0]), traced.omega.size)
+    return Followed(result, traced.omega, traced.slope)
+
+
+def count_many(loops: ReducedLoops, line: float, bounds: FloatArray) -> IntArray:
+    """Count the roots right of a line of many loops at once, (N,).
+
+    Parameters
+    ----------
+    loops : ReducedLoops
+        N loops.
+    line : float
+        Re s of the line.
+    bounds : array, (N,)
+        As in `follow`.
+
+    Returns
+    -------
+    int array, (N,)
+        `UNDECIDED` where they cannot be counted.
+    """
+    limit = bounds * 1.001 + 1e-9
+    turns = limit * loops.delays.max(axis=1, initial=0.0)
+    # As many loops together as make some ten thousand points, if the copies are small.
+    ends = np.cumsum(np.minimum(turns, _MAX_POINTS) + 200.0)
+    piece = np.floor(ends / (_TOGETHER if loops.order <= _SMALL else 1.0)).astype(int)
+    counts = np.full(loops.count, UNDECIDED, dtype=np.int64)
+    for key in np.unique(piece):
+        index = np.flatnonzero(piece == key)
+        some = loops.take(index)
+        counts[index] = _counts(some, line, _traced(some, line, limit[index]))
+    return counts
+
+
+@dataclass(frozen=True, eq=False)
+class _Traced:
+    """arg det Δ and (det Δ)'/det Δ up the line for many loops, row after row."""
+
+    rows: npt.NDArray[np.intp]
+    omega: FloatArray
+    phase: FloatArray
+    slope: ComplexArray
+    turn: FloatArray
+    undecided: npt.NDArray[np.bool_]
+
+
+def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray:
+    n = loops.order
     # Denser towards the bottom, where det Δ is far from its asymptote.
-    first = 40 + int(2.0 * turns) + (0 if small else 2 * n)
-    omega = bound * np.linspace(0.0, 1.0, first) ** 2
-    if not small:
-        omega = np.concatenate([omega, bound * np.geomspace(1.0, _FAR, 2 * n)[1:]])
-    phase, slope = _phase_and_slope(loops, line, omega)
+    if n <= _SMALL:
+        return np.asarray(_NEAR * limit * np.linspace(0.0, 1.0, 40 + int(3.0 * turns)) ** 2)
+    omega = limit * np.linspace(0.0, 1.0, 40 + int(2.0 * turns) + 2 * n) ** 2
+    return np.append(omega, limit * np.geomspace(1.0, _FAR, 2 * n)[1:])
+
+
+def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
+    turns = limits * loops.delays.max(axis=1, initial=0.0)
+    undecided = ~(turns < 0.5 * _MAX_POINTS)
+    turns = np.where(undecided, 0.0, turns)
+    places = [_first_places(loops, float(b), float(t)) for b, t in zip(limits, turns, strict=True)]
+    rows = np.repeat(np.arange(loops.count), [place.size for place in places])
+    omega = np.concatenate(places)
+    phase, slope = _phase_and_slope(loops, rows, line + 1j * omega)
     while True:
-        undecided = RootCount(line, None, bound, omega.size)
-        if not np.isfinite(slope).all():
-            return Followed(undecided, omega, slope)
+        undecided[rows[~np.isfinite(slope)]] = True
         width = np.diff(omega)
-        turn = np.remainder(np.diff(phase) + math.pi, 2 * math.pi) - math.pi
+        turn = np.diff(phase)
+        turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
         # arg det Δ(line + iω) changes at the rate Re (det Δ)'/det Δ.
         expected = 0.5 * width * (slope.real[1:] + slope.real[:-1])
         size = width * np.maximum(np.abs(slope[1:]), np.abs(slope[:-1]))
-        coarse = np.flatnonzero(
-            (size > _LARGEST_STEP) | (np.abs(turn - expected) > _LARGEST_SURPRISE)
+        coarse = (size > _LARGEST_STEP) | (np.abs(turn - expected) > _LARGEST_SURPRISE)
+        coarse &= rows[1:] == rows[:-1]
+        where = np.flatnonzero(coarse)
+        if where.size:
+            ends = rows[where]
+            undecided[ends[width[where] < 1e-13 * limits[ends]]] = True
+            where = where[~undecided[ends]]
+        if where.size == 0:
+            return _Traced(rows, omega, phase, slope, turn, undecided)
+        if omega.size > _MAX_POINTS:
+            undecided[rows[where]] = True
+            return _Traced(rows, omega, phase, slope, turn, undecided)
+        middle = 0.5 * (omega[where] + omega[where + 1])
+        new_phase, new_slope = _phase_and_slope(loops, rows[where], line + 1j * middle)
+        order = np.argsort(np.concatenate([np.arange(omega.size), where + 0.5]), kind="stable")
+        rows, omega, phase, slope = (
+            np.concatenate(pair)[order]
+            for pair in (
+                (rows, rows[where]),
+                (omega, middle),
+                (phase, new_phase),
+                (slope, new_slope),
+            )
         )
-        if coarse.size == 0:
-            break
-        if omega.size > _MAX_POINTS or width[coarse].min() < 1e-13 * bound:
-            return Followed(undecided, omega, slope)
-        middle = 0.5 * (omega[coarse] + omega[coarse + 1])
-        new_phase, new_slope = _phase_and_slope(loops, line, middle)
-        omega = np.insert(omega, coarse + 1, middle)
-        phase = np.insert(phase, coarse + 1, new_phase)
-        slope = np.insert(slope, coarse + 1, new_slope)
-    top = complex(line, omega[-1])
-    end = math.atan2(top.imag, top.real)
-    beyond = phase[-1] - n * end
+
+
+def _counts(loops: ReducedLoops, line: float, traced: _Traced) -> IntArray:
+    """Return the number of roots that the turn of the argument says, for each loop."""
+    n, rows = loops.order, traced.rows
+    last = np.searchsorted(rows, np.arange(loops.count), side="right") - 1
+    top = line + 1j * traced.omega[last]
+    end = np.angle(top)
+    beyond = traced.phase[last] - n * end
     # The branch that vanishes at infinity.
-    beyond += 2 * math.pi * round((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
-    total = n / 2 - (turn.sum() + n * (math.pi / 2 - end) - beyond) / math.pi
-    whole = round(float(total))
-    count = whole if abs(total - whole) < 1e-3 else None
-    return Followed(RootCount(line, count, bound, omega.size), omega, slope)
+    beyond += 2 * math.pi * np.rint((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
+    inner = rows[1:] == rows[:-1]
+    turn = np.bincount(rows[1:][inner], traced.turn[inner], minlength=loops.count)
+    total = n / 2 - (turn + n * (math.pi / 2 - end) - beyond) / math.pi
+    sure = ~traced.undecided & np.isfinite(total)
+    total = np.where(sure, total, 0.5)
+    whole = np.rint(total)
+    sure &= (np.abs(total - whole) < 1e-3) & (whole >= 0)
+    return np.asarray(np.where(sure, whole, UNDECIDED).astype(np.int64))
 
 
-def _argument_beyond(loops: ReducedLoops, s: complex) -> float:
-    """Return arg (det Δ(s)/sⁿ) to within 1, from Σ arg (1 − μ) over the eigenvalues μ."""
-    share = np.eye(loops.order) - loops.matrices(np.array([[s]]))[0, 0] / s
+def _argument_beyond(loops: ReducedLoops, s: ComplexArray) -> FloatArray:
+    """Return arg (det Δ(s)/sⁿ) = Σ arg (1 − μ), over the eigenvalues μ, to within π."""
     if loops.order <= _SMALL:
-        return float(np.angle(1.0 - np.linalg.eigvals(share)).sum())
+        # Each is below asin (1/k) with k = _NEAR.
+        return np.zeros(loops.count)
+    share = np.eye(loops.order) - loops.matrices(s[:, None])[:, 0] / s[:, None, None]
     # With |μ| below 1/4 three terms of the logarithm suffice for hundreds of states.
     square = share @ share
-    powers = np.trace(share) + np.trace(square) / 2.0 + (square * share.T).sum() / 3.0
-    return -float(powers.imag)
+    powers = np.trace(share, axis1=1, axis2=2) + np.trace(square, axis1=1, axis2=2) / 2.0
+    powers = powers + np.einsum("nij,nji->n", square, share) / 3.0
+    return np.asarray(-powers.imag)
 
 
 def _phase_and_slope(
-    loops: ReducedLoops, line: float, omega: FloatArray
+    loops: ReducedLoops, rows: npt.NDArray[np.intp], s: ComplexArray
 ) -> tuple[FloatArray, ComplexArray]:
-    """Return arg det Δ and (det Δ)'/det Δ at line + iω; NaN where Δ is singular."""
-    sign, size, slope = (part[0] for part in loops.evaluate((line + 1j * omega)[None]))
+    """Return arg det Δ and (det Δ)'/det Δ of a loop at each place; NaN where Δ is singular."""
+    if loops.count == 1:
+        sign, size, slope = (part[0] for part in loops.evaluate(s[None]))
+    else:
+        sign, size, slope = (part[:, 0] for part in loops.take(rows).evaluate(s[:, None]))
     return np.angle(sign), np.where(np.isfinite(size), slope, np.nan)

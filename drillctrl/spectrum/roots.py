@@ -163,9 +163,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
     return s, False
 
 
-def _gather(
-    system: DelaySystem, depth: float, line: float | None = None
-) -> _Gathered:
+def _gather(system: DelaySystem, depth: float, line: float | None = None) -> _Gathered:
     """Return polished roots, rightmost first, all of them converged, and where they end.
 
     Parameters
@@ -181,9 +179,7 @@ def _gather(
     return _counted(system, depth, line) if found is None else found
 
 
-def _collocated(
-    system: DelaySystem, depth: float, line: float | None
-) -> _Gathered | None:
+def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathered | None:
     """Polish what a collocation that resolves all of it supplies; None beyond its reach."""
     ranks = sum(left.shape[1] for left, _ in system.factors)
 
@@ -236,9 +232,7 @@ def _collocated(
     return None
 
 
-def _counted(
-    system: DelaySystem, depth: float, line: float | None
-) -> _Gathered:
+def _counted(system: DelaySystem, depth: float, line: float | None) -> _Gathered:
     """Return roots that the argument principle has counted.
 
     Raises
@@ -314,9 +308,7 @@ def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
     return known_roots(system)[0]
 
 
-def known_roots(
-    system: DelaySystem, most: int | None = None
-) -> tuple[tuple[Root, ...], float]:
+def known_roots(system: DelaySystem, most: int | None = None) -> tuple[tuple[Root, ...], float]:
     """Return `dominant_roots`, ``most`` at most, and a line that no others lie right of.
 
     It lies 1/τ left of the spectral abscissa unless that would be too many roots.
