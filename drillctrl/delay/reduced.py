@@ -234,7 +234,7 @@ def reduced(system: DelaySystem, *, plain: bool = False) -> ReducedLoops:
 
     Its states are scaled first, so that the units in which they are given do not matter.
     """
-    system = system.balanced()
+    system = system.balanced
     n = system.order
     left = [np.zeros((n, 0))] + [one for one, _ in system.factors]
     right = [np.zeros((0, n))] + [other for _, other in system.factors]

@@ -156,8 +156,9 @@ class DelaySystem:
             self.output_names,
         )
 
+    @functools.cached_property
     def balanced(self) -> DelaySystem:
-        """Return the system with its states scaled so that the matrices' norms are small.
+        """The system with its states scaled so that the matrices' norms are small.
 
         It is the system itself where that is so already. Inputs, outputs and roots stay.
         """

@@ -113,8 +113,11 @@ def follow(loops: ReducedLoops, line: float, bound: float) -> Followed:
     """
     limit = np.array([bound * 1.001 + 1e-9])
     traced = _traced(loops, line, limit)
-    whole = _counts(loops, line, traced)[0]
-    count = None if whole == UNDECIDED else int(whole)
+    count = None
+    if not traced.undecided[0]:
+        total = _total(loops, line + 1j * traced.omega[-1:], traced.phase[-1:], traced.turn.sum())
+        whole = round(float(total[0]))
+        count = whole if abs(float(total[0]) - whole) < 1e-3 and whole >= 0 else None
     result = RootCount(line, count, float(limit[0]), traced.omega.size)
     return Followed(result, traced.omega, traced.slope)
 
@@ -165,7 +168,7 @@ def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray
     n = loops.order
     # Denser towards the bottom, where det Δ is far from its asymptote.
     if n <= _SMALL:
-        return np.asarray(_NEAR * limit * np.linspace(0.0, 1.0, 40 + int(3.0 * turns)) ** 2)
+        return np.asarray(_NEAR * limit * np.linspace(0.0, 1.0, 32 + int(3.0 * turns)) ** 2)
     omega = limit * np.linspace(0.0, 1.0, 40 + int(2.0 * turns) + 2 * n) ** 2
     return np.append(omega, limit * np.geomspace(1.0, _FAR, 2 * n)[1:])
 
@@ -173,22 +176,25 @@ def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray
 def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
     turns = limits * loops.delays.max(axis=1, initial=0.0)
     undecided = ~(turns < 0.5 * _MAX_POINTS)
-    turns = np.where(undecided, 0.0, turns)
-    places = [_first_places(loops, float(b), float(t)) for b, t in zip(limits, turns, strict=True)]
+    turns[undecided] = 0.0
+    places = [_first_places(loops, b, t) for b, t in zip(limits.tolist(), turns.tolist(), strict=True)]
     rows = np.repeat(np.arange(loops.count), [place.size for place in places])
     omega = np.concatenate(places)
     phase, slope = _phase_and_slope(loops, rows, line + 1j * omega)
     while True:
-        undecided[rows[~np.isfinite(slope)]] = True
+        infinite = ~np.isfinite(slope)
+        if infinite.any():
+            undecided[rows[infinite]] = True
         width = np.diff(omega)
         turn = np.diff(phase)
         turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
         # arg det Δ(line + iω) changes at the rate Re (det Δ)'/det Δ.
-        expected = 0.5 * width * (slope.real[1:] + slope.real[:-1])
-        size = width * np.maximum(np.abs(slope[1:]), np.abs(slope[:-1]))
-        coarse = (size > _LARGEST_STEP) | (np.abs(turn - expected) > _LARGEST_SURPRISE)
-        coarse &= rows[1:] == rows[:-1]
+        rate, speed = slope.real, np.abs(slope)
+        expected = 0.5 * width * (rate[1:] + rate[:-1])
+        coarse = width * np.maximum(speed[1:], speed[:-1]) > _LARGEST_STEP
+        coarse |= np.abs(turn - expected) > _LARGEST_SURPRISE
         where = np.flatnonzero(coarse)
+        where = where[rows[where] == rows[where + 1]]
         if where.size:
             ends = rows[where]
             undecided[ends[width[where] < 1e-13 * limits[ends]]] = True
@@ -214,21 +220,27 @@ def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
 
 def _counts(loops: ReducedLoops, line: float, traced: _Traced) -> IntArray:
     """Return the number of roots that the turn of the argument says, for each loop."""
-    n, rows = loops.order, traced.rows
+    rows = traced.rows
     last = np.searchsorted(rows, np.arange(loops.count), side="right") - 1
-    top = line + 1j * traced.omega[last]
-    end = np.angle(top)
-    beyond = traced.phase[last] - n * end
-    # The branch that vanishes at infinity.
-    beyond += 2 * math.pi * np.rint((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
     inner = rows[1:] == rows[:-1]
     turn = np.bincount(rows[1:][inner], traced.turn[inner], minlength=loops.count)
-    total = n / 2 - (turn + n * (math.pi / 2 - end) - beyond) / math.pi
+    total = _total(loops, line + 1j * traced.omega[last], traced.phase[last], turn)
     sure = ~traced.undecided & np.isfinite(total)
     total = np.where(sure, total, 0.5)
     whole = np.rint(total)
     sure &= (np.abs(total - whole) < 1e-3) & (whole >= 0)
     return np.asarray(np.where(sure, whole, UNDECIDED).astype(np.int64))
+
+
+def _total(
+    loops: ReducedLoops, top: ComplexArray, phase: FloatArray, turn: FloatArray
+) -> FloatArray:
+    """Return the count of each loop from the turn of arg det Δ up to the top."""
+    n, end = loops.order, np.angle(top)
+    beyond = phase - n * end
+    # The branch that vanishes at infinity.
+    beyond += 2 * math.pi * np.rint((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
+    return np.asarray(n / 2 - (turn + n * (math.pi / 2 - end) - beyond) / math.pi)
 
 
 def _argument_beyond(loops: ReducedLoops, s: ComplexArray) -> FloatArray:

@@ -371,7 +371,7 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
 
 def _in_own_units(system: DelaySystem) -> tuple[DelaySystem, float]:
     """Return the system balanced, in a unit of time that suits its roots, and that unit."""
-    system = system.balanced()
+    system = system.balanced
     delay = system.max_delay
     size = float(np.abs(system.A0).max())
     if 1e-2 <= delay <= 1e2 and size * max(delay, 1.0) >= 1e-2:

@@ -84,7 +84,7 @@ def test_balancing_keeps_the_response():
     units = np.array([1e-5, 1.0, 1e4])
     a0, a1 = rng.normal(size=(2, 3, 3)) * units[:, None] / units
     system = DelaySystem(a0, (a1,), (0.7,), rng.normal(size=(3, 2)) * units[:, None])
-    other = system.balanced()
+    other = system.balanced
     assert np.abs(other.A0).max() < 1e2 < np.abs(system.A0).max()
     s = 0.3 + 1.1j
     one, two = (
