@@ -69,7 +69,7 @@ class AffineLoops:
     def _evaluated(
         self, omega: FloatArray, line: float, *, with_slope: bool
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        s = (line + 1j * omega).reshape(len(omega), -1)
+        s = np.asarray(line + 1j * omega, dtype=np.complex128).reshape(len(omega), -1)
         ends = [end.evaluate(s, with_slope=with_slope) for end in (self.low, self.high)]
         scale = np.maximum(ends[0][1], ends[1][1])
         scale = np.where(np.isfinite(scale), scale, 0.0)
@@ -144,8 +144,8 @@ def scan_affine(
     line : float
         σ: roots right of it are counted.
     """
-    ends = [matrices(positions, np.full(positions.size, end)) for end in (low, high)]
-    loops = affine_loops(*ends, line)
+    start, stop = (matrices(positions, np.full(positions.size, end)) for end in (low, high))
+    loops = affine_loops(start, stop, line)
     found = [np.zeros(0)] * 4
     # Lines with similar delays share a grid.
     group = np.floor(2.0 * np.log2(np.maximum(loops.delays, 1e-6))).astype(int)
@@ -163,24 +163,24 @@ def scan_affine(
     rows, frequency, t = rows[order], frequency[order], t[order]
     jump = jump[order].astype(np.int64)
     bounds = np.searchsorted(rows, np.arange(positions.size + 1))
-    parts = [slice(bounds[i], bounds[i + 1]) for i in range(positions.size)]
+    segments = [slice(bounds[i], bounds[i + 1]) for i in range(positions.size)]
     # Count where the roots are farthest from the line: amid the widest gap.
     probes = np.empty(positions.size)
     places = np.empty(positions.size, dtype=int)
-    for i, part in enumerate(parts):
-        edges = np.concatenate([[0.0], t[part], [1.0]])
+    for i, segment in enumerate(segments):
+        edges = np.concatenate([[0.0], t[segment], [1.0]])
         places[i] = int(np.argmax(np.diff(edges)))
         probes[i] = 0.5 * (edges[places[i]] + edges[places[i] + 1])
     known = count_right(matrices(positions, low + probes * (high - low)), line)
     lines = []
-    for i, part in enumerate(parts):
-        steps = np.concatenate([[0], np.cumsum(jump[part])])
+    for i, segment in enumerate(segments):
+        steps = np.concatenate([[0], np.cumsum(jump[segment])])
         lines.append(
             ScanLine(
                 float(positions[i]),
-                low + t[part] * (high - low),
-                frequency[part],
-                jump[part],
+                low + t[segment] * (high - low),
+                frequency[segment],
+                jump[segment],
                 known[i] + steps - steps[places[i]],
                 low,
                 high,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.base.arrays import FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.charts.affine_scan import scan_affine
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.counting_scan import scan_counting
@@ -33,7 +33,8 @@ def _is_affine(plane: Plane, held: Axis, scanned: Axis, *, rows: bool) -> bool:
         return False
     matrices = _transposed(plane, rows)
     t = held.low + held.span * np.array([0.31, 0.83])
-    signs, sizes = [], []
+    signs: list[ComplexArray] = []
+    sizes: list[FloatArray] = []
     for share in (0.0, 0.37, 1.0):
         A0, A1, delays = matrices(t, np.full(2, scanned.low + share * scanned.span))
         # The same places for all three, of the size of the roots.

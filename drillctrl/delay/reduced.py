@@ -80,7 +80,7 @@ class ReducedLoops:
 
     @property
     def _is_plain(self) -> bool:
-        return self.residues.shape[2] == 0
+        return bool(self.residues.shape[2] == 0)
 
     def matrices(self, s: ComplexArray) -> ComplexArray:
         """Return Δ(s) of each loop at its own points, (N, G) → (N, G, n, n)."""

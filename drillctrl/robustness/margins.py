@@ -13,7 +13,8 @@ import scipy.optimize
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.system import DelaySystem
-from drillctrl.robustness.axis import crossings, sharpen_crossing
+from drillctrl.robustness.axis import crossings
+from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
 
 LONGEST_DELAYS = 10.0
@@ -77,11 +78,10 @@ def delay_margin(system: DelaySystem) -> DelayMargin:
 
     Notes
     -----
-    With one delay and z = exp(−iωτ) a root on the axis makes both A0 + zA1 and its conjugate
-    singular against ±iω, so their Kronecker sum is singular: the quadratic eigenvalue
-    problem z²(A1⊗I) + z(A0⊗I + I⊗A0) + I⊗A1 has all critical z on the unit circle (Chen, Gu
-    and Nett 1995). With several delays, boxes of frequency and factor that a Lipschitz bound
-    clears of roots are removed, up to ten times the delays. No crossing is stepped over.
+    With one delay all frequencies at which some delay puts a root on the axis come from one
+    eigenvalue problem (`drillctrl.spectrum.critical`). With several delays, boxes of frequency
+    and factor that a Lipschitz bound clears of roots are removed, up to ten times the delays.
+    No crossing is stepped over.
     """
     if not system.delays:
         raise InputError("delays", system.delays, "at least one")
@@ -99,32 +99,14 @@ def delay_margin(system: DelaySystem) -> DelayMargin:
 
 def _nearest_factors(system: DelaySystem) -> Iterator[tuple[float, float]]:
     """Yield (f, ω): for every critical pair of ω and angle the nearest delays of either side."""
-    tau, a0, a1 = system.delays[0], system.A0, system.delayed[0]
-    for z, omega in _critical_pairs(a0, a1):
+    system = system.balanced
+    (left, right), tau = system.factors[0], system.delays[0]
+    _, frequencies, phases, _ = critical_points(system.A0[None], left[None], right[None])
+    for omega, phase in zip(frequencies.tolist(), phases.tolist(), strict=True):
         turn = 2.0 * math.pi / (omega * tau)
-        first = (-float(np.angle(z)) % (2.0 * math.pi)) / (omega * tau)
+        first = phase / (omega * tau)
         below = first + turn * math.floor((1.0 - first) / turn)
-        for guess in (below, below + turn):
-            sharp = sharpen_crossing(system, omega, guess) if guess > 0.0 else None
-            if sharp is not None:
-                yield sharp
-
-
-def _critical_pairs(a0: FloatArray, a1: FloatArray) -> Iterator[tuple[complex, float]]:
-    """Yield (z, ω > 0) with |z| near 1 and iω near an eigenvalue of A0 + zA1."""
-    eye = np.eye(len(a0))
-    size = len(a0) ** 2
-    m2, m0 = np.kron(a1, eye), np.kron(eye, a1)
-    m1 = np.kron(a0, eye) + np.kron(eye, a0)
-    zero, one = np.zeros((size, size)), np.eye(size)
-    pencil = np.block([[zero, one], [-m0, -m1]]), np.block([[one, zero], [zero, m2]])
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        values = scipy.linalg.eigvals(*pencil)
-    values = values[np.isfinite(values)]
-    for z in values[np.abs(np.abs(values) - 1.0) < 1e-4]:
-        for s in np.linalg.eigvals(a0 + z * a1):
-            if abs(s.real) <= 1e-3 * (1.0 + abs(s)) and s.imag >= 1e-9:
-                yield complex(z), float(s.imag)
+        yield from ((factor, omega) for factor in (below, below + turn) if factor > 0.0)
 
 
 def parameter_margin(

@@ -259,7 +259,7 @@ class Climb:
 
 def places(seen: Followed) -> ComplexArray:
     """Return where to start on a line: next to roots, and evenly in between."""
-    s = seen.result.line + 1j * seen.omega
+    s = np.asarray(seen.result.line + 1j * seen.omega, dtype=np.complex128)
     size = np.abs(seen.slope)
     if s.size <= _MOST_STARTS:
         return s

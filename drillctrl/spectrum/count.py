@@ -115,7 +115,8 @@ def follow(loops: ReducedLoops, line: float, bound: float) -> Followed:
     traced = _traced(loops, line, limit)
     count = None
     if not traced.undecided[0]:
-        total = _total(loops, line + 1j * traced.omega[-1:], traced.phase[-1:], traced.turn.sum())
+        turn = np.array([traced.turn.sum()])
+        total = _total(loops, line, traced.omega[-1:], traced.phase[-1:], turn)
         whole = round(float(total[0]))
         count = whole if abs(float(total[0]) - whole) < 1e-3 and whole >= 0 else None
     result = RootCount(line, count, float(limit[0]), traced.omega.size)
@@ -164,6 +165,10 @@ class _Traced:
     undecided: npt.NDArray[np.bool_]
 
 
+def _up(line: float, omega: FloatArray) -> ComplexArray:
+    return np.asarray(line + 1j * omega, dtype=np.complex128)
+
+
 def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray:
     n = loops.order
     # Denser towards the bottom, where det Δ is far from its asymptote.
@@ -177,10 +182,12 @@ def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
     turns = limits * loops.delays.max(axis=1, initial=0.0)
     undecided = ~(turns < 0.5 * _MAX_POINTS)
     turns[undecided] = 0.0
-    places = [_first_places(loops, b, t) for b, t in zip(limits.tolist(), turns.tolist(), strict=True)]
+    places = [
+        _first_places(loops, b, t) for b, t in zip(limits.tolist(), turns.tolist(), strict=True)
+    ]
     rows = np.repeat(np.arange(loops.count), [place.size for place in places])
     omega = np.concatenate(places)
-    phase, slope = _phase_and_slope(loops, rows, line + 1j * omega)
+    phase, slope = _phase_and_slope(loops, rows, _up(line, omega))
     while True:
         infinite = ~np.isfinite(slope)
         if infinite.any():
@@ -205,7 +212,7 @@ def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
             undecided[rows[where]] = True
             return _Traced(rows, omega, phase, slope, turn, undecided)
         middle = 0.5 * (omega[where] + omega[where + 1])
-        new_phase, new_slope = _phase_and_slope(loops, rows[where], line + 1j * middle)
+        new_phase, new_slope = _phase_and_slope(loops, rows[where], _up(line, middle))
         order = np.argsort(np.concatenate([np.arange(omega.size), where + 0.5]), kind="stable")
         rows, omega, phase, slope = (
             np.concatenate(pair)[order]
@@ -223,8 +230,9 @@ def _counts(loops: ReducedLoops, line: float, traced: _Traced) -> IntArray:
     rows = traced.rows
     last = np.searchsorted(rows, np.arange(loops.count), side="right") - 1
     inner = rows[1:] == rows[:-1]
-    turn = np.bincount(rows[1:][inner], traced.turn[inner], minlength=loops.count)
-    total = _total(loops, line + 1j * traced.omega[last], traced.phase[last], turn)
+    turn = np.zeros(loops.count)
+    np.add.at(turn, rows[1:][inner], traced.turn[inner])
+    total = _total(loops, line, traced.omega[last], traced.phase[last], turn)
     sure = ~traced.undecided & np.isfinite(total)
     total = np.where(sure, total, 0.5)
     whole = np.rint(total)
@@ -233,21 +241,22 @@ def _counts(loops: ReducedLoops, line: float, traced: _Traced) -> IntArray:
 
 
 def _total(
-    loops: ReducedLoops, top: ComplexArray, phase: FloatArray, turn: FloatArray
+    loops: ReducedLoops, line: float, omega: FloatArray, phase: FloatArray, turn: FloatArray
 ) -> FloatArray:
     """Return the count of each loop from the turn of arg det Δ up to the top."""
-    n, end = loops.order, np.angle(top)
+    n, end = loops.order, np.arctan2(omega, line)
     beyond = phase - n * end
     # The branch that vanishes at infinity.
-    beyond += 2 * math.pi * np.rint((_argument_beyond(loops, top) - beyond) / (2 * math.pi))
+    beyond += 2 * math.pi * np.rint((_argument_beyond(loops, line, omega) - beyond) / (2 * math.pi))
     return np.asarray(n / 2 - (turn + n * (math.pi / 2 - end) - beyond) / math.pi)
 
 
-def _argument_beyond(loops: ReducedLoops, s: ComplexArray) -> FloatArray:
+def _argument_beyond(loops: ReducedLoops, line: float, omega: FloatArray) -> FloatArray:
     """Return arg (det Δ(s)/sⁿ) = Σ arg (1 − μ), over the eigenvalues μ, to within π."""
     if loops.order <= _SMALL:
         # Each is below asin (1/k) with k = _NEAR.
         return np.zeros(loops.count)
+    s = _up(line, omega)
     share = np.eye(loops.order) - loops.matrices(s[:, None])[:, 0] / s[:, None, None]
     # With |μ| below 1/4 three terms of the logarithm suffice for hundreds of states.
     square = share @ share

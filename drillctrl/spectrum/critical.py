@@ -43,7 +43,7 @@ def critical_points(
     direction : int array, (k,)
         +1 where the root moves to the right as the delay grows, −1 to the left.
     """
-    count, n, rank = left.shape
+    count, _, rank = left.shape
     if rank == 0 or count == 0:
         none = np.zeros(0)
         return none.astype(np.intp), none, none, none.astype(np.intp)
@@ -56,7 +56,8 @@ def critical_points(
     size = np.abs(A0).max(axis=(1, 2), initial=0.0)[rows, None]
     near = (np.abs(roots.real) < _NEAR_AXIS * (np.abs(roots) + 1e-3 * size)) & (roots.imag > 0)
     which, columns = np.nonzero(near)
-    omega, phase = roots[which, columns].imag, -np.angle(found[which])
+    omega = np.asarray(roots[which, columns].imag, dtype=float)
+    phase = -np.angle(found[which])
     return _sharpened(A0, late, rows[which], omega, phase)
 
 

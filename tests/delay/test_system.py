@@ -65,7 +65,7 @@ def test_delays_are_put_in_order():
     one, two, three, four = (k * np.eye(2) for k in (1.0, 2.0, 3.0, 4.0))
     system = DelaySystem(one, (two, three, four, one), (5.0, 0.0, 1.0, 5.0))
     assert system.delays == (1.0, 5.0)
-    assert (system.A0 == 4.0 * np.eye(2)).all()
+    assert (4.0 * np.eye(2) == system.A0).all()
     assert [float(a[0, 0]) for a in system.delayed] == [4.0, 3.0]
     with pytest.raises(ValueError, match="read-only"):
         system.A0[0, 0] = 0.0
