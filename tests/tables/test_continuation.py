@@ -54,9 +54,8 @@ def test_a_descent_leaves_the_bounds_that_its_neighbours_gains_lie_on():
     known = structure.vector(beside.K1, beside.K2)
     assert known.min() == structure.lower.min()
     found = design_node(NodeTask(0, point, structure, 0, (known,)))
-    assert found.spectral_abscissa == pytest.approx(
-        design(point, "case2").spectral_abscissa, rel=1e-3
-    )
+    # No worse than a design from scratch: a neighbour's gains may lead to a better end.
+    assert found.spectral_abscissa < 0.999 * design(point, "case2").spectral_abscissa
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.01, 2))
