@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = (
-    *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "simulation"),
+    *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
     *("designs", "charts", "tables", "studies", "paper", "interop", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.system import DelaySystem
-from drillctrl.drilling.coefficients import GROUP_NAMES
 from drillctrl.drilling.linear import LinearArrays, linear_arrays
 from drillctrl.drilling.motion import MotionArrays, motion_arrays
 from drillctrl.drilling.plant import Plant, paper_plant
@@ -104,8 +103,8 @@ class Case:
         own = {name: value for name, value in changes.items() if name in plant.own}
         groups = {name: value for name, value in changes.items() if name not in plant.own}
         for name in groups:
-            if name not in GROUP_NAMES:
-                known = ", ".join((*GROUP_NAMES, *plant.own))
+            if name not in plant.group_names:
+                known = ", ".join(plant.parameter_names)
                 raise InputError("parameter", name, f"one of {known}")
         if groups:
             point = point.with_changes(**groups)
@@ -199,7 +198,7 @@ def as_case(where: Where, plant: Plant | None = None) -> Case:
     Parameters
     ----------
     where : OperatingPoint, RigPoint, DelaySystem or Case
-        A point without a plant is the paper's.
+        A point without a plant is the paper's, with the string that its rig may have.
     plant : Plant, optional
         The physics at a point.
 
@@ -219,11 +218,11 @@ def as_case(where: Where, plant: Plant | None = None) -> Case:
         if plant is not None:
             raise InputError("plant", "given", "left out beside a DelaySystem")
         return Case(None, None, None, where)
-    physics = paper_plant() if plant is None else plant
     if isinstance(where, RigPoint):
-        return Case(physics, where.operating_point(), where)
+        drilled = paper_plant(**where.rig.hardware()) if plant is None else plant
+        return Case(drilled, where.operating_point(), where)
     if isinstance(where, OperatingPoint):
-        return Case(physics, where)
+        return Case(paper_plant() if plant is None else plant, where)
     raise InputError("point", type(where).__name__, _KINDS)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 Expression = Any  # casadi.SX, or a float or array where every argument is one
@@ -70,13 +71,17 @@ def rig_coefficients(rig: Any) -> Coefficients:
 
 
 def dimensionless_coefficients(point: Any) -> Coefficients:
-    """Return the dimensionless coefficients (Eqs. 15, 16) from names as in `GROUP_NAMES`."""
+    """Return the dimensionless coefficients (Eqs. 15, 16) from names as in `GROUP_NAMES`.
+
+    Groups that a string has no use for may be missing; what follows from them is NaN.
+    """
+    eta, xi, kappa = (getattr(point, name, math.nan) for name in ("eta", "xi", "kappa"))
     return Coefficients(
         mass=1.0,
         inertia=1.0,
-        axial_damping=2 * point.xi * point.eta,
-        torsional_damping=2 * point.kappa,
-        axial_stiffness=point.eta**2,
+        axial_damping=2 * xi * eta,
+        torsional_damping=2 * kappa,
+        axial_stiffness=eta**2,
         torsional_stiffness=1.0,
         cutting_force=point.psi,
         cutting_torque=1.0,

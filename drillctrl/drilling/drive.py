@@ -49,5 +49,9 @@ class TopDrive(Block):
             coordinates=names,
             mass=mass,
             inputs={**string.inputs, "drive": "phi"},
+            outputs={
+                name: (quantity, {("phi" if n == TOP[1] else n): w for n, w in weights.items()})
+                for name, (quantity, weights) in string.outputs.items()
+            },
             imposed=tuple(name for name in string.imposed if name != TOP[1]),
         )

@@ -71,6 +71,17 @@ def _steady_bit(plant: Plant) -> _SteadyBit:
 
 
 @by_form
+def bit_response(plant: Plant) -> ca.Function:
+    """Return p → W0 (2, 4), w (2, 1), r (1, 4), τ0: what the bit answers about steady drilling.
+
+    Its excess load is W0 X + w r X(t − τ0), X its own four states.
+    """
+    form, bit = expressions(plant), _steady_bit(plant)
+    outputs = [bit.load_now, bit.load_depth, bit.depth_then, steady_delay(form.c)]
+    return ca.Function("bit_response", [form.parameters], outputs)
+
+
+@by_form
 def linear_depth(plant: Plant) -> ca.Function:
     """Return p → c1, c2, d0 of the linear depth of cut d0 + c1 X + c2 Xd (Eqs. 17, 19).
 

@@ -244,7 +244,8 @@ def paper_plant(
     ):
         if not isinstance(part, kind):
             raise InputError(name, type(part).__name__, f"a {kind.__name__}")
-    return Plant(law, string, blocks)
+    groups = tuple(name for name in GROUP_NAMES if name not in string.unused_groups)
+    return Plant(law, string, blocks, groups)
 
 
 def rig_plant() -> Plant:

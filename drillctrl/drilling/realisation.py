@@ -125,7 +125,9 @@ def realise(string: String) -> Realisation:
         ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
     )  # fmt: skip
     for name, (quantity, weights) in string.outputs.items():
-        made = made.with_output(Signal(name, quantity), *weighted(made, name, weights))
+        # What an imposed end has moved is in the reference of all that hangs from it.
+        free_ones = {state: w for state, w in weights.items() if state not in string.imposed}
+        made = made.with_output(Signal(name, quantity), *weighted(made, name, free_ones))
     _check_names(made)
     return made
 
@@ -142,12 +144,29 @@ def weighted(made: Realisation, name: str, weights: object) -> tuple[ca.SX, ca.S
 
 
 def _inverse(mass: ca.SX) -> ca.SX:
-    """Return the inverse of a mass matrix; entry by entry where it is diagonal."""
-    if mass.sparsity().is_diag() and mass.nnz() == mass.shape[0]:
+    """Return the inverse of a mass matrix; entry by entry where it is diagonal.
+
+    Else coordinates whose rows are numbers are eliminated in numbers, and only what is left
+    of the others is inverted in symbols.
+    """
+    size = mass.shape[0]
+    if mass.sparsity().is_diag() and mass.nnz() == size:
         return ca.diag(1 / ca.diag(mass))
-    if mass.is_constant():
-        return ca.SX(ca.inv(ca.DM(mass)))
-    return ca.inv(mass)
+    plain = [i for i in range(size) if mass[i, :].is_constant() and mass[:, i].is_constant()]
+    other = [i for i in range(size) if i not in plain]
+    if not plain:
+        return ca.inv(mass)
+    first = ca.SX(ca.inv(ca.DM(mass[plain, plain])))
+    if not other:
+        return first
+    across = first @ mass[plain, other]
+    last = ca.inv(mass[other, other] - mass[other, plain] @ across)
+    inverse = ca.SX(size, size)
+    inverse[plain, plain] = first + across @ last @ across.T
+    inverse[plain, other] = -across @ last
+    inverse[other, plain] = -(last @ across.T)
+    inverse[other, other] = last
+    return inverse
 
 
 def _check_names(made: Realisation) -> None:

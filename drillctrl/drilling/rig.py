@@ -111,6 +111,13 @@ class Rig:
         """Unit of dimensionless axial force in newtons."""
         return self.mass * self.axial_scale / self.time_scale**2
 
+    def hardware(self) -> dict[str, Any]:
+        """Return what the rig says of its plant's parts, by the names that `paper_plant` takes.
+
+        A rig of lumped numbers says nothing: its string is the paper's.
+        """
+        return {}
+
     def with_rock_strength(self, rock_strength: float) -> Rig:
         """Return the same rig in another rock (Pa)."""
         return dataclasses.replace(self, rock_strength=rock_strength)

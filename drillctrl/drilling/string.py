@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 
@@ -148,7 +148,15 @@ def as_matrix(name: str, given: Any) -> ca.SX:
 
 
 class StringModel(Part):
-    """Makes a string from the coefficients and its own parameters."""
+    """Makes a string from the coefficients and its own parameters.
+
+    Attributes
+    ----------
+    unused_groups : tuple of str
+        Dimensionless groups that do not bear on it, since it says itself what they would.
+    """
+
+    unused_groups: ClassVar[tuple[str, ...]] = ()
 
     def build(self, c: Coefficients, q: Any) -> String:
         """Return the string.

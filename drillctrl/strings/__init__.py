@@ -1,0 +1,1 @@
+"""Real drill strings: tallies of pipe, exact receptances, finite elements, modes and drives."""
