@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
+from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.robustness.margins import ParameterMargin, parameter_margin
 
@@ -41,12 +44,19 @@ def point_margins(
     case, inputs = as_case(point), feedback.inputs
     _, here = case.physics("a margin of the point")
     assumed = case.system(inputs).max_delay
+    gains, late = feedback.vector(K1, K2), len(case.system(inputs).delays) > 1
 
     def margin(name: str) -> ParameterMargin:
         def loop_at(error: float) -> DelaySystem:
             there = case.with_changes(**{name: getattr(here, name) * (1.0 + error)})
             return close_loop(there.system(inputs), feedback, K1, K2, delay=assumed)
 
-        return parameter_margin(loop_at, limit)
+        def abscissas(errors: FloatArray) -> FloatArray:
+            values = getattr(here, name) * (1.0 + errors)
+            return spectral_abscissas(case, {name: values}, feedback, gains)
+
+        # Where the delay moves and the controller's does not, a loop has two.
+        two = name == "omega0" and bool(np.any(K2))
+        return parameter_margin(loop_at, limit, abscissas=None if two or late else abscissas)
 
     return {name: margin(name) for name in ("psi", "delta0", "omega0")}

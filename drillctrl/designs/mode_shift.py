@@ -23,7 +23,10 @@ _SMALL, _ROUGH = 1e-10, 1e-5
 _SHARE, _LEAST = 0.05, 1e-3
 # A mode is one of torsion, or axial, where the other takes less part than this.
 _PURE = 0.2
-_KINDS = {"x": "axial", "dx": "axial", "theta": "torsional", "dtheta": "torsional"}
+_KINDS = {
+    **dict.fromkeys(("length", "axial_rate"), "axial"),
+    **dict.fromkeys(("angle", "angular_rate"), "torsional"),
+}
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def mode_shifts(
     structure: FeedbackStructure,
     K1: FloatArray,
     K2: FloatArray,
-    states: tuple[str, ...] = (),
+    quantities: tuple[str, ...] = (),
 ) -> tuple[ModeShift, ...]:
     """Follow the rightmost roots of a plant while all gains grow together from nothing.
 
@@ -70,8 +73,8 @@ def mode_shifts(
         Without control.
     structure, K1, K2
         The feedback.
-    states : tuple of str
-        Names of the plant's states, if known: x, dx, theta, dtheta.
+    quantities : tuple of str
+        What the plant's states measure, if known.
 
     Returns
     -------
@@ -84,26 +87,28 @@ def mode_shifts(
         if root.multiplicity == 1 and root.converged:
             end = _followed(plant, structure, K1, K2, root.value)
             if end is not None:
-                kind = mode_kind(plant, root.value, states)
+                kind = mode_kind(plant, root.value, quantities)
                 found.append(ModeShift(kind, root.value, complex(end.real, abs(end.imag))))
     return tuple(found)
 
 
-def mode_kind(plant: DelaySystem, s: complex, states: tuple[str, ...]) -> str | None:
+def mode_kind(plant: DelaySystem, s: complex, quantities: tuple[str, ...]) -> str | None:
     """Say which motion alone takes part in a mode, by the participation of the states.
 
     The participation of state k is yₖ (Δ'(s) x)ₖ over the sum of all, with the left and right
     null vectors y and x of Δ(s): it does not depend on the units of the states.
     """
-    if len(states) != plant.order:
+    if len(quantities) != plant.order:
         return None
     left, _, right = np.linalg.svd(characteristic.matrix(plant, s))
     y, x = left[:, -1].conj(), right[-1].conj()
     parts = np.abs(y * (characteristic.derivative(plant, s) @ x))
     total = float(parts.sum())
     shares = dict.fromkeys(_KINDS.values(), 0.0)
-    for name, part in zip(states, parts.tolist(), strict=True):
-        shares[_KINDS[name]] += part / total
+    for quantity, part in zip(quantities, parts.tolist(), strict=True):
+        # What a filter or an actuator holds belongs to neither motion.
+        if quantity in _KINDS:
+            shares[_KINDS[quantity]] += part / total
     kind = max(shares, key=lambda one: shares[one])
     return kind if shares[kind] >= 1.0 - _PURE else None
 

@@ -308,7 +308,11 @@ def _robustness_lines(design: Design) -> _Lines:
     off = design.fragility
     if design.stable:
         radius = design.stability_radius
-        lines.append(("Margins", f"relative errors of the plant below {radius.lower_bound:.2g}"))
+        text = f"relative errors of the plant below {radius.lower_bound:.2g}"
+        if radius.lower_bound == 0.0:
+            text = f"relative errors of the plant of {radius.value:.2g} destabilise; of smaller"
+            text += " ones nothing is known"
+        lines.append(("Margins", text))
     if (margin := design.delay_margin) is not None:
         longer = "any" if math.isinf(margin.limit) else f"{margin.limit:g} (or more)"
         longer = longer if math.isinf(margin.longer) else f"{margin.longer:.4g}"

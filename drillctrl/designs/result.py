@@ -166,8 +166,9 @@ class Design:
         """Modes that decay more slowly with the gains than without; see `mode_shifts`."""
         if self.structure is None:
             return ()
-        states = () if self.case.plant is None else self.case.plant.state_names
-        shifts = mode_shifts(self.plant, self.structure, self.K1, self.K2, states)
+        known = () if self.case.plant is None else self.case.plant.linear.states
+        quantities = tuple(state.quantity for state in known)
+        shifts = mode_shifts(self.plant, self.structure, self.K1, self.K2, quantities)
         return tuple(shift for shift in shifts if shift.worse)
 
     @property

@@ -21,6 +21,9 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 
 _MOST_PIECES = 200_000
+# A search ends, with what it has, after so many pieces of a system with four states; pieces of
+# one with n states cost (n/4)³ as much.
+_MOST_WORK = 4_000_000
 _MERGE = 1e-6
 
 
@@ -146,7 +149,7 @@ def _search(
     line: _Line, boxes: _Boxes, weight: float, delay_weight: float, best: AxisMinimum, gap: float
 ) -> AxisMinimum:
     """Minimise max(σ_min/weight, |f − 1|/delay_weight) over boxes by bounding and halving."""
-    lowest = 0.0
+    lowest, work = 0.0, _MOST_WORK * (4.0 / max(line.system.order, 4)) ** 3
     for _ in range(80):
         sigma, by_omega, by_factor = line.bounds(boxes)
         away = np.abs(boxes.factor - 1.0)
@@ -163,7 +166,8 @@ def _search(
         if not alive.any():
             lowest = best.value * (1.0 - gap)
             break
-        if alive.sum() > _MOST_PIECES:
+        work -= alive.size
+        if alive.sum() > _MOST_PIECES or 2 * alive.sum() > work:
             lowest = max(0.0, float(floor.min()))
             break
         boxes = boxes.take(alive).halved(by_omega[alive] >= by_factor[alive])

@@ -18,6 +18,7 @@ from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
 
 LONGEST_DELAYS = 10.0
+_AT_ONCE = 25
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,10 @@ def _nearest_factors(system: DelaySystem) -> Iterator[tuple[float, float]]:
 
 
 def parameter_margin(
-    loop_at: Callable[[float], DelaySystem], limit: float = 1.0, points: int = 200
+    loop_at: Callable[[float], DelaySystem],
+    limit: float = 1.0,
+    points: int = 200,
+    abscissas: Callable[[FloatArray], FloatArray] | None = None,
 ) -> ParameterMargin:
     """Return the relative errors of a parameter between which a loop stays stable.
 
@@ -123,6 +127,8 @@ def parameter_margin(
     points : int
         Steps in either direction; each change of sign is bisected to 1e-12, and wherever α
         has a maximum among the steps it is sought between them.
+    abscissas : callable, optional
+        α of the loops at many errors at once, where there is a faster way to it.
 
     Raises
     ------
@@ -134,11 +140,15 @@ def parameter_margin(
     def alpha(error: float) -> float:
         return spectral_abscissa(loop_at(error))
 
+    def one_by_one(errors: FloatArray) -> FloatArray:
+        return np.array([alpha(error) for error in errors.tolist()])
+
     if alpha(0.0) >= 0.0:
         raise InputError("loop", "unstable at the nominal value", "stable")
+    several = abscissas or one_by_one
     down = -np.linspace(0.0, 1.0, points + 1)[:-1]
     up = np.linspace(0.0, top, points + 1)
-    lower, upper = _first_unstable(alpha, down), _first_unstable(alpha, up)
+    lower, upper = (_first_unstable(alpha, several, errors) for errors in (down, up))
     return ParameterMargin(
         -1.0 if lower is None else lower,
         top if upper is None else upper,
@@ -147,13 +157,21 @@ def parameter_margin(
     )
 
 
-def _first_unstable(alpha: Callable[[float], float], errors: FloatArray) -> float | None:
+def _first_unstable(
+    alpha: Callable[[float], float],
+    several: Callable[[FloatArray], FloatArray],
+    errors: FloatArray,
+) -> float | None:
     """Return the error nearest to the first at which α reaches 0; None if it does not."""
-    values = [alpha(float(errors[0]))]
-    for index, error in enumerate(errors[1:], 1):
-        values.append(alpha(float(error)))
+    values: list[float] = []
+    for index, error in enumerate(errors):
+        if index >= len(values):
+            # A loop that is lost soon needs no look at what lies far off.
+            values += several(errors[index : index + _AT_ONCE]).tolist()
+        if index == 0:
+            continue
         stable, unstable = float(errors[index - 1]), float(error)
-        if index > 1 and values[-2] >= max(values[-3], values[-1]):
+        if index > 1 and values[index - 1] >= max(values[index - 2], values[index]):
             before = float(errors[index - 2])
             ends = sorted((before, unstable))
             peak = scipy.optimize.minimize_scalar(
@@ -161,7 +179,7 @@ def _first_unstable(alpha: Callable[[float], float], errors: FloatArray) -> floa
             )
             if peak.fun <= 0.0:
                 return float(scipy.optimize.brentq(alpha, before, float(peak.x), xtol=1e-12))
-        if values[-1] >= 0.0:
+        if values[index] >= 0.0:
             return float(scipy.optimize.brentq(alpha, stable, unstable, xtol=1e-12))
     return None
 
