@@ -49,16 +49,17 @@ def robust_alternative(
 
     def objective(gains: FloatArray) -> tuple[float, FloatArray]:
         value, gradient = worst(gains)
-        nominal, slope = family.abscissa(gains)
+        nominal = family.value(gains)
         if nominal <= limit:
             if value < best[0][0]:
                 best[0] = (value, gains)
             return value, gradient
+        _, slope = family.abscissa(gains)
         return value + _PENALTY * (nominal - limit), gradient + _PENALTY * slope
 
     margin = 1e-3 * (upper - lower)
     for pull in (0.0, 0.02, 0.1, 0.3):
         # The optimum is a cusp; beginning beside it lets the descent turn.
         start = np.clip((1.0 - pull) * best[0][1], lower + margin, upper - margin)
-        bfgs(objective, start, lower, upper, most=80 * lower.size)
+        bfgs(objective, start, lower, upper, most=40 * lower.size)
     return best[0][1]

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.certificate import OptimalityCertificate, shortest_combination
 from drillctrl.synthesis.descent import Objective, bfgs
 from drillctrl.synthesis.family import LoopFamily
+from drillctrl.synthesis.search import spread_points
 
 _LOOKED = 64
 _BEGUN = 6
@@ -103,7 +103,7 @@ def constrained_search(
     """
     lower, upper = family.feedback.lower, family.feedback.upper
     margin = 1e-3 * (upper - lower)
-    cube = qmc.Sobol(lower.size, scramble=True, rng=seed).random(_LOOKED)
+    cube = spread_points(_LOOKED, lower.size, seed)
     sampled = lower + (upper - lower) * cube
     starts = np.vstack([*candidates, sampled, 0.2 * sampled])
     starts = np.clip(starts, lower + margin, upper - margin)
@@ -153,7 +153,7 @@ def certify_sampled(
     lower, upper = family.feedback.lower, family.feedback.upper
     width = upper - lower
     count = 4 * (width.size + 1)
-    cube = qmc.Sobol(width.size, scramble=True, rng=seed).random(1 << (count - 1).bit_length())
+    cube = spread_points(count, width.size, seed)
     radius = _SAMPLED_RADIUS * width
     around = np.vstack([search.gains, search.gains + radius * (2.0 * cube - 1.0)])
     around = np.clip(around, lower, upper)

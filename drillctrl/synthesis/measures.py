@@ -46,7 +46,8 @@ def worst_case(families: Sequence[LoopFamily]) -> Objective:
     """
 
     def objective(gains: FloatArray) -> tuple[float, FloatArray]:
-        return max((f.abscissa(gains) for f in families), key=lambda result: result[0])
+        # Only the worst has to say how it changes.
+        return max(families, key=lambda family: family.value(gains)).abscissa(gains)
 
     return objective
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -155,10 +154,26 @@ def global_search(
     return Search(best, distinct, hits, evaluations)
 
 
+def spread_points(count: int, dimension: int, seed: int) -> FloatArray:
+    """Return points that fill the unit cube evenly, (count, dimension).
+
+    Multiples, modulo 1, of numbers that are hardest to approximate by fractions together (a
+    Kronecker sequence with powers of the root of x^(d + 1) = x + 1), begun in the middle, and
+    at random for any seed but 0. SciPy's sequences lead to no better designs and take longer to
+    load than the whole search.
+    """
+    root = 2.0
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (dimension + 1))
+    steps = root ** -np.arange(1.0, dimension + 1)
+    begin = np.random.default_rng(seed).random(dimension) if seed else 0.5
+    return np.asarray((begin + np.arange(1, count + 1)[:, None] * steps) % 1.0)
+
+
 def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
-    """Return the best points of two Halton sets, over the box and over its middle part."""
+    """Return the best of points spread over the box and over its middle part."""
     lower, upper = family.feedback.lower, family.feedback.upper
-    cube = qmc.Halton(lower.size, scramble=True, rng=seed).random(effort.looked)
+    cube = spread_points(effort.looked, lower.size, seed)
     wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
     # The box is generous: many useful gains are small against it.
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
