@@ -25,7 +25,12 @@ from .designs.loop_analysis import LoopAnalysis as LoopAnalysis
 from .designs.loop_analysis import analyze_loop as analyze_loop
 from .designs.loops import spectral_abscissas as spectral_abscissas
 from .designs.margins import point_margins as point_margins
+from .designs.report import Report as Report
+from .designs.report import report as report
+from .designs.result import Analysis as Analysis
 from .designs.result import Design as Design
+from .designs.robustness import Robustness as Robustness
+from .designs.robustness import robust_alternative as robust_alternative
 from .designs.sensitivity import root_sensitivity as root_sensitivity
 from .designs.worst_case import WorstCase as WorstCase
 from .drilling.bit_rock import BitRock as BitRock

@@ -14,7 +14,7 @@ ROOMS = (
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (
-    *("designs.result", "charts.chart", "charts.stabilisable", "charts.volume"),
+    *("designs.result", "designs.report", "charts.chart", "charts.stabilisable", "charts.volume"),
     *("tables.table", "simulation.result", "studies.campaign", "studies.comparison"),
 )
 

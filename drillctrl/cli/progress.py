@@ -5,13 +5,25 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import click
 
 if TYPE_CHECKING:
     from drillctrl.base.workers import Progress
+
+
+@contextlib.contextmanager
+def open_stages() -> Iterator[Callable[[str], None] | None]:
+    """Yield what says on a terminal what is being worked on, where steps cannot be counted."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    try:
+        yield lambda stage: click.echo(f"\r\x1b[K{stage} …", nl=False, err=True)
+    finally:
+        click.echo("\r\x1b[K", nl=False, err=True)
 
 
 @contextlib.contextmanager

@@ -10,9 +10,10 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
+from drillctrl.cli.progress import open_stages
 
 if TYPE_CHECKING:
-    from drillctrl.designs.result import Design
+    from drillctrl.designs.result import Analysis
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -61,12 +62,18 @@ def check_outputs(out: str | None, plot: str | None) -> None:
     check_figure(plot)
 
 
-def deliver(result: Design, prove: bool, as_json: bool, out: str | None, plot: str | None) -> None:
-    """Print the result, and write the files asked for."""
+def deliver(
+    result: Analysis, prove: bool, as_json: bool, out: str | None, plot: str | None
+) -> None:
+    """Print all that is said of the result, and write the files asked for."""
+    from drillctrl.designs.report import report
+
+    with open_stages() as tell:
+        told = report(result, tell)
     proof = result.prove() if prove else None
     fields: dict[str, Any] = {}
     if as_json or out is not None:
-        fields = result.to_dict()
+        fields = told.to_dict()
         if proof is not None:
             fields["certificate"]["proof"] = dataclasses.asdict(proof)
     if out is not None:
@@ -75,7 +82,7 @@ def deliver(result: Design, prove: bool, as_json: bool, out: str | None, plot: s
         figure = result.plot().get_figure(root=True)
         assert figure is not None
         write_figure(plot, figure)
-    click.echo(json_text(fields) if as_json else result.summary())
+    click.echo(json_text(fields) if as_json else told.summary())
     if proof is not None and not as_json:
         counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
         click.echo(

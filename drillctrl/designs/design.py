@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,8 @@ from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER
-from drillctrl.designs.remedies import Remedy, remedies
-from drillctrl.designs.result import Design, assess
+from drillctrl.designs.result import Analysis, Design, assess
+from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.worst_case import WorstCase
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.structures import as_structure
@@ -83,32 +83,28 @@ def design(
     value = problem.reported_value(family, objective, solution.gains)
     if trials:
         result = result.tried()
-    return replace(
-        result,
+    known = {item.name: getattr(result, item.name) for item in fields(Analysis)}
+    known["elapsed_seconds"] = time.perf_counter() - began
+    return Design(
+        **known,
         objective=objective,
         objective_value=max([result.spectral_abscissa if value is None else value, *alphas]),
         requirements=requirements,
         requirements_met=_meets(result, requirements, family, solution.gains),
         optimality=solution.optimality,
         evaluations=solution.evaluations,
-        elapsed_seconds=time.perf_counter() - began,
-        seek=_remedies,
     )
 
 
-def _remedies(failed: Design) -> tuple[Remedy, ...]:
-    return remedies(failed, design, analyze)
-
-
 def _meets(
-    result: Design, requirements: Requirements, family: LoopFamily, gains: FloatArray
+    result: Analysis, requirements: Requirements, family: LoopFamily, gains: FloatArray
 ) -> bool:
     """Whether a design fulfils what was required, by exact abscissa and guaranteed radius."""
     wanted = requirements.decay, requirements.stability_radius, requirements.input_gain
     decay, radius, peak = wanted
     return (
         (decay is None or result.spectral_abscissa + result.loop.abscissa_error <= -decay)
-        and (radius is None or result.stability_radius.value >= radius)
+        and (radius is None or relative_radius(result).value >= radius)
         and (peak is None or (result.stable and problem.input_gain(family, gains) <= peak))
     )
 
@@ -122,7 +118,7 @@ def analyze(
     m: int | None = None,
     order: int = DEFAULT_ORDER,
     trials: bool | None = False,
-) -> Design:
+) -> Analysis:
     """Analyse given gains, or the open loop.
 
     Parameters
@@ -160,8 +156,4 @@ def analyze(
         result = assess(as_case(point), chosen, *gains, m, order)
     if trials:
         result = result.tried()
-    result = replace(result, elapsed_seconds=time.perf_counter() - began, seek=_remedies)
-    if m is not None or order != DEFAULT_ORDER:
-        # Refused now rather than when it is read.
-        _ = result.spectral_radius
-    return result
+    return replace(result, elapsed_seconds=time.perf_counter() - began)

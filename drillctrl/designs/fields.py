@@ -15,116 +15,55 @@ from drillctrl.drilling.steady import steady_state
 from drillctrl.spectrum.roots import Root
 
 if TYPE_CHECKING:
-    from drillctrl.designs.result import Design
+    from drillctrl.designs.result import Analysis, Design
 
 
-# Share of the decay rate that the alternative beside a design may lose.
-GIVE_UP = 0.05
-
-
-def design_fields(design: Design) -> dict[str, Any]:
-    """Return the JSON fields of ``design`` and ``analyze``."""
-    point = design.point
-    structure = design.structure
+def result_fields(result: Analysis) -> dict[str, Any]:
+    """Return the JSON fields of what `analyze` returns."""
+    point = result.point
+    structure = result.structure
     fields: dict[str, Any] = {
-        "schema": "drillctrl/design/1" if design.evaluations else "drillctrl/analyze/1",
+        "schema": "drillctrl/analyze/1",
         "operating_point": point and {**dataclasses.asdict(point), "delay": point.delay},
         "structure": structure.name if structure else None,
         "outputs": list(structure.outputs) if structure else [],
         "bounds": _bounds(structure) if structure else None,
-        "K1": design.K1.ravel().tolist(),
-        "K2": design.K2.ravel().tolist(),
-        **_loop_fields(design),
+        "K1": result.K1.ravel().tolist(),
+        "K2": result.K2.ravel().tolist(),
+        **_loop_fields(result),
         "open_loop": {
-            "spectral_abscissa": design.open_loop.spectral_abscissa,
-            "stable": design.open_loop.stable,
+            "spectral_abscissa": result.open_loop.spectral_abscissa,
+            "stable": result.open_loop.stable,
         },
-        "recommended": design.recommended,
-        "reason": design.reason,
-        "trials": [trial.to_dict() for trial in design.trials],
-        "modes_worse": [mode.to_dict() for mode in design.modes_worse],
-        "robustness": None,
-        "evaluations": design.evaluations,
-        "elapsed_seconds": design.elapsed_seconds,
+        "recommended": result.recommended,
+        "reason": result.reason,
+        "trials": [trial.to_dict() for trial in result.trials],
+        "modes_worse": [mode.to_dict() for mode in result.modes_worse],
+        "elapsed_seconds": result.elapsed_seconds,
     }
-    if design.optimality is not None:
-        fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
-        fields["certificate"]["boundary"] = _boundary_fields(design)
-        fields["remedies"] = [remedy.to_dict() for remedy in design.remedies]
-        fields["objective"] = _objective_fields(design)
-        fields["requirements"] = {
-            **dataclasses.asdict(design.requirements),
-            "met": design.requirements_met,
-        }
-    if design.fragility is not None:
-        off = dataclasses.asdict(design.fragility)
-        fields["robustness"] = {**_distance_fields(design), "spectral_abscissa_with": off}
-    if has_alternative(design):
-        fields["alternative"] = _alternative_fields(design)
-    if design.rig_point is not None:
-        fields["rig"] = _rig_fields(design.rig_point, design)
+    if result.rig_point is not None:
+        fields["rig"] = _rig_fields(result.rig_point, result)
     return fields
 
 
-def has_alternative(design: Design) -> bool:
-    """Whether a neighbour that decays more slowly is of use: not if one was designed for."""
-    return design.minimises_alpha and design.stable and not design.verdict.refused
-
-
-def _boundary_fields(design: Design) -> dict[str, Any] | None:
-    decision = design.boundary
-    if decision is None:
-        return None
-    return {**dataclasses.asdict(decision), "next_root": finite_or_none(decision.next_root)}
+def design_fields(design: Design) -> dict[str, Any]:
+    """Return the JSON fields of what `design` returns."""
+    fields = {**result_fields(design), "schema": "drillctrl/design/1"}
+    fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
+    fields["objective"] = _objective_fields(design)
+    fields["requirements"] = {
+        **dataclasses.asdict(design.requirements),
+        "met": design.requirements_met,
+    }
+    fields["evaluations"] = design.evaluations
+    return fields
 
 
 def _objective_fields(design: Design) -> dict[str, Any]:
-    assert design.objective is not None
-    assert design.objective_value is not None
     return {
         "name": design.objective.name,
         **dataclasses.asdict(design.objective),
         "value": finite_or_none(design.objective_value),
-    }
-
-
-def _distance_fields(design: Design) -> dict[str, Any]:
-    radius, margin = design.stability_radius, design.delay_margin
-    fields: dict[str, Any] = {
-        "stability_radius": radius.value,
-        "stability_radius_lower_bound": radius.lower_bound,
-        "delay_margin": None,
-    }
-    if margin is not None:
-        fields["delay_margin"] = {
-            "shorter": margin.shorter,
-            "longer": finite_or_none(margin.longer),
-            "limit": finite_or_none(margin.limit),
-        }
-    fields["point_margins"] = None
-    if design.point_margins is not None:
-        fields["point_margins"] = {
-            name: {"lower": errors.lower, "upper": errors.upper, "limit": errors.limit}
-            for name, errors in design.point_margins.items()
-        }
-    return fields
-
-
-def _alternative_fields(design: Design) -> dict[str, Any]:
-    other = design.robust_alternative(GIVE_UP)
-    assert other.fragility is not None
-    return {
-        "give_up": GIVE_UP,
-        "K1": other.K1.ravel().tolist(),
-        "K2": other.K2.ravel().tolist(),
-        "spectral_abscissa": other.spectral_abscissa,
-        "stable": other.stable,
-        "recommended": other.recommended,
-        "reason": other.reason,
-        "robustness": {
-            **_distance_fields(other),
-            "spectral_abscissa_with": dataclasses.asdict(other.fragility),
-        },
     }
 
 
@@ -150,7 +89,7 @@ def _root_fields(root: Root) -> dict[str, Any]:
     }
 
 
-def _loop_fields(design: Design) -> dict[str, Any]:
+def _loop_fields(design: Analysis) -> dict[str, Any]:
     loop, radius = design.loop, design.spectral_radius
     return {
         "spectral_abscissa": loop.spectral_abscissa,
@@ -173,7 +112,7 @@ def _loop_fields(design: Design) -> dict[str, Any]:
     }
 
 
-def _rig_fields(rig_point: RigPoint, design: Design) -> dict[str, Any]:
+def _rig_fields(rig_point: RigPoint, design: Analysis) -> dict[str, Any]:
     steady = steady_state(rig_point)
     fields: dict[str, Any] = {
         "parameters": dataclasses.asdict(rig_point.rig),

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.design import analyze, design
+from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structure
 from drillctrl.spectrum.roots import spectral_abscissa
-
-if TYPE_CHECKING:
-    from drillctrl.designs.result import Design
-
 
 # How much faster the bit is let turn, and in how many steps that is looked at.
 _FASTEST = 4.0
@@ -36,22 +33,22 @@ class Remedy:
         Other torque feedback; an axial actuator; faster rotation without feedback.
     name : str
         Of the structure; ``"none"`` for rotation alone.
-    design : Design
+    result : Analysis
         The stable loop, with its point and gains.
     """
 
     kind: str
     name: str
-    design: Design
+    result: Analysis
 
     @property
     def spectral_abscissa(self) -> float:
         """α of the stable loop."""
-        return self.design.spectral_abscissa
+        return self.result.spectral_abscissa
 
     def to_dict(self) -> dict[str, object]:
         """Return the JSON fields."""
-        found = self.design
+        found = self.result
         assert found.point is not None
         return {
             "kind": self.kind,
@@ -64,9 +61,7 @@ class Remedy:
         }
 
 
-def remedies(
-    failed: Design, design: Callable[..., Design], analyze: Callable[..., Design]
-) -> tuple[Remedy, ...]:
+def remedies(failed: Design) -> tuple[Remedy, ...]:
     """Return what stabilises the point of a design that is not stable.
 
     Tried are the presets that allow more than the structure, within the paper's bounds, the
@@ -78,8 +73,6 @@ def remedies(
     ----------
     failed : Design
         Of a point.
-    design, analyze : callable
-        The verbs, which know how to find gains for a candidate.
 
     Returns
     -------
@@ -97,7 +90,7 @@ def remedies(
         result = design(failed.case, candidate, trials=False)
         if result.stable:
             found.append(Remedy(kind, candidate.name, result))
-    faster = _stable_speed(failed, analyze)
+    faster = _stable_speed(failed)
     return tuple(found) if faster is None else (*found, Remedy("speed", "none", faster))
 
 
@@ -141,7 +134,7 @@ def _ranges(structure: FeedbackStructure) -> dict[tuple[str, str, str], _Range]:
     }
 
 
-def _stable_speed(failed: Design, analyze: Callable[..., Design]) -> Design | None:
+def _stable_speed(failed: Design) -> Analysis | None:
     """Return the open loop at the lowest higher speed found at which it is stable."""
     point = failed.point
     assert point is not None

@@ -12,11 +12,14 @@ import numpy.typing as npt
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
-from drillctrl.designs.result import Design
+from drillctrl.designs.margins import point_margins
+from drillctrl.designs.result import Analysis
+from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.trials import uncontrolled_runs
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import as_structure
 from drillctrl.robustness.loop_margins import LoopMargins, loop_margins
+from drillctrl.robustness.margins import ParameterMargin, delay_margin
 from drillctrl.simulation.outcome import Figures
 from drillctrl.studies.comparison import OPEN_LOOP, SORTS, Comparison, Row
 from drillctrl.studies.comparison_text import delay_room
@@ -39,13 +42,13 @@ def _subjects(
     bounds: Mapping[str, tuple[float, float]] | None,
     trials: bool | None,
     tell: Callable[[str], None],
-) -> list[tuple[str, Design, bool]]:
+) -> list[tuple[str, Analysis, bool]]:
     """Design, analyse and try the candidates, the open loop first."""
     open_loop = analyze(point)
-    subjects = [(OPEN_LOOP, open_loop, False)]
+    subjects: list[tuple[str, Analysis, bool]] = [(OPEN_LOOP, open_loop, False)]
     free: dict[str, Figures] | None = None
 
-    def tried(candidate: Design) -> Design:
+    def tried(candidate: Analysis) -> Analysis:
         nonlocal free
         if not trials or candidate.point is None:
             return candidate
@@ -153,6 +156,9 @@ def compare(
                 subject,
                 designed,
                 _margins(subject),
+                relative_radius(subject),
+                delay_margin(subject.system()) if subject.stable else None,
+                _point_margins(subject),
                 respond(subject, pushed, duration, "linear"),
                 respond(subject, pushed, duration, "nonlinear"),
                 basin(subject, pushed, duration),
@@ -167,7 +173,14 @@ def compare(
     return Comparison(point, tuple(rows), sort, pushed, duration, elapsed)
 
 
-def _margins(subject: Design) -> LoopMargins | None:
+def _point_margins(subject: Analysis) -> dict[str, ParameterMargin] | None:
+    structure = subject.structure
+    if structure is None or not subject.stable:
+        return None
+    return point_margins(subject.case, structure, subject.K1, subject.K2)
+
+
+def _margins(subject: Analysis) -> LoopMargins | None:
     """Return the margins of a stable loop with one input."""
     structure = subject.structure
     if structure is None or not subject.stable or len(structure.inputs) != 1:
@@ -177,7 +190,7 @@ def _margins(subject: Design) -> LoopMargins | None:
 
 def _chart(
     point: OperatingPoint | RigPoint,
-    subject: Design,
+    subject: Analysis,
     region: tuple[tuple[str, float, float], tuple[str, float, float]] | None,
 ) -> StabilityChart | None:
     if region is None:

@@ -12,9 +12,11 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
-from drillctrl.designs.result import Design
+from drillctrl.designs.result import Analysis
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.robustness.loop_margins import LoopMargins
+from drillctrl.robustness.margins import DelayMargin, ParameterMargin
+from drillctrl.robustness.radius import StabilityRadius
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 from drillctrl.studies.comparison_text import (
     COLUMNS,
@@ -87,12 +89,18 @@ class Row:
     ----------
     label : str
         Its name in the table.
-    design : Design
+    result : Analysis
         Its gains and linear analysis.
     designed : bool
         Whether the gains were designed here.
     margins : LoopMargins or None
         Of a stable loop with one input.
+    stability_radius : StabilityRadius
+        Relative to the norms of the plant's matrices.
+    delay_margin : DelayMargin or None
+        Of a stable loop.
+    point_margins : dict or None
+        How wrong ψ, δ0 and ω0 may be; of a stable loop with feedback.
     linear, nonlinear : Response or None
         After the disturbance.
     basin : float or None
@@ -104,9 +112,12 @@ class Row:
     """
 
     label: str
-    design: Design
+    result: Analysis
     designed: bool
     margins: LoopMargins | None
+    stability_radius: StabilityRadius
+    delay_margin: DelayMargin | None
+    point_margins: dict[str, ParameterMargin] | None
     linear: Response | None
     nonlinear: Response | None
     basin: float | None
@@ -116,14 +127,14 @@ class Row:
     @property
     def formation_change(self) -> float | None:
         """Smallest relative change of ψ, up or down, that destabilises; linear."""
-        margins = self.design.point_margins
+        margins = self.point_margins
         return None if margins is None else min(margins["psi"].upper, -margins["psi"].lower)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of a row."""
-        design, margins, linear, bent = self.design, self.margins, self.linear, self.nonlinear
+        design, margins, linear, bent = self.result, self.margins, self.linear, self.nonlinear
         alpha = design.spectral_abscissa
-        delays = design.delay_margin
+        delays = self.delay_margin
         summary = None if bent is None else bent.run.summary
         return {
             "label": self.label,
@@ -134,7 +145,7 @@ class Row:
             "stable": design.stable,
             "spectral_abscissa": alpha,
             "decay_time": -1.0 / alpha if design.stable else None,
-            "stability_radius": design.stability_radius.value,
+            "stability_radius": self.stability_radius.value,
             "delay_margin": None
             if delays is None
             else {"shorter": delays.shorter, "longer": finite_or_none(delays.longer)},
@@ -223,7 +234,7 @@ class Comparison:
         from drillctrl.studies.compare_page import comparison_page
 
         rows = [row.to_dict() for row in self.rows]
-        designs = [row.design for row in self.rows]
+        designs = [row.result for row in self.rows]
         return comparison_page(
             self.figures(),
             point=self._point_text(),
@@ -258,15 +269,15 @@ class Comparison:
         """Draw charts, motions, Nyquist curves and roots; return each with its title."""
         from drillctrl.studies import compare_figure as figure
 
-        fed = [row for row in self.rows if row.design.structure is not None]
+        fed = [row for row in self.rows if row.result.structure is not None]
         looks = figure.looks([row.label for row in fed])
         shown = [row for row in self.rows if row.label in looks]
-        stable = [row for row in shown if row.design.stable]
+        stable = [row for row in shown if row.result.stable]
         linear = {row.label: row.linear for row in stable if row.linear is not None}
         bent = {row.label: row.nonlinear for row in stable if row.nonlinear is not None}
-        loops = {row.label: _loop(row.design) for row in shown if row.margins is not None}
+        loops = {row.label: _loop(row.result) for row in shown if row.margins is not None}
         roots = {
-            row.label: np.array([root.value for root in row.design.loop.dominant_roots])
+            row.label: np.array([root.value for root in row.result.loop.dominant_roots])
             for row in self.rows[: figure.SHOWN + 1]
         }
         charted = [*shown[: figure.SHOWN - 1], *(row for row in self.rows if row not in fed)]
@@ -286,7 +297,7 @@ class Comparison:
         return f"<Comparison of {names}, by {self.sort}>"
 
 
-def _loop(design: Design) -> ComplexArray:
+def _loop(design: Analysis) -> ComplexArray:
     """Return L(iω) of a loop with one input, over frequencies that resolve it."""
     assert design.structure is not None
     omega = frequency_grid(design.system())

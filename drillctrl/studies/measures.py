@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.designs.result import Design
+from drillctrl.designs.result import Analysis
 from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
@@ -40,7 +40,7 @@ class Response:
 
 
 def respond(
-    design: Design, disturbance: Mapping[str, float], duration: float, model: str
+    design: Analysis, disturbance: Mapping[str, float], duration: float, model: str
 ) -> Response | None:
     """Simulate a candidate after a disturbance; None where the linear motion only grows."""
     if design.point is None or (model == "linear" and not design.stable):
@@ -56,7 +56,7 @@ def respond(
     return Response(run, float(np.abs(motion.x).max()), inputs, run.summary.settling_time)
 
 
-def basin(design: Design, disturbance: Mapping[str, float], duration: float) -> float | None:
+def basin(design: Analysis, disturbance: Mapping[str, float], duration: float) -> float | None:
     """Return the largest multiple of a disturbance after which the motion still settles.
 
     Multiples from 1/16 to 16 are looked at; 0 if even the smallest does not settle, 16 if

@@ -105,7 +105,7 @@ def test_basin_ends_between_settling_and_not(at_f):
     fields = row(at_f, "case1")
     from drillctrl.studies.measures import respond
 
-    design = next(one.design for one in at_f.rows if one.label == "case1")
+    design = next(one.result for one in at_f.rows if one.label == "case1")
     for factor, expected in ((0.98, True), (1.05, False)):
         size = factor * fields["basin"]
         found = respond(design, {"dx": size, "dtheta": size}, 120.0, "nonlinear")
@@ -113,7 +113,7 @@ def test_basin_ends_between_settling_and_not(at_f):
 
 
 def test_formation_change_ends_at_the_boundary(at_f):
-    design = next(one.design for one in at_f.rows if one.label == "case2")
+    design = next(one.result for one in at_f.rows if one.label == "case2")
     change = row(at_f, "case2")["formation_change"]
     ends = []
     for sign in (-1, 1):

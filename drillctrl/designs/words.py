@@ -1,0 +1,232 @@
+"""Results of `analyze` and `design` in words for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from drillctrl.base import units
+from drillctrl.designs.loop_analysis import LoopAnalysis
+from drillctrl.designs.worst_case import WorstCase
+from drillctrl.drilling.gain_units import gain_units
+from drillctrl.drilling.steady import steady_state
+from drillctrl.simulation.outcome import SETTLES, Figures
+from drillctrl.synthesis.objectives import Robust, SemiDiscrete
+
+if TYPE_CHECKING:
+    from drillctrl.designs.result import Analysis, Design
+
+Lines = list[tuple[str, str]]
+
+_SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
+_VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
+
+
+def set_out(lines: Sequence[tuple[str, str]]) -> str:
+    """Return labels and texts side by side."""
+    width = max(len(label) for label, _ in lines) + 2
+    return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+
+
+def result_lines(result: Analysis) -> Lines:
+    """Return what is known of gains, or of an open loop."""
+    word = "stabilised" if result.stable else "not stabilised"
+    if result.structure is None:
+        word = "stable" if result.stable else "not stable"
+    return [*_opening(result), *_loop_lines(result, f"{word}: α = ", [])]
+
+
+def design_lines(design: Design) -> Lines:
+    """Return what is known of gains that were designed."""
+    word = "stabilised: α = " if design.stable else "not stabilised: best α = "
+    best = design.optimality
+    text = f"{best.method}, residual {best.stationarity:.1g}"
+    if best.active_bounds:
+        text += f"; on a bound: {', '.join(best.active_bounds)}"
+    hits = f"{best.hits} descent(s) ended here, {best.basins} distinct end(s)"
+    if best.next_best is not None:
+        hits += f", next best {best.next_best:.4f}"
+    return [
+        *_opening(design),
+        *_loop_lines(design, word, _objective_lines(design)),
+        ("Optimal by", text),
+        ("", hits),
+    ]
+
+
+def _opening(result: Analysis) -> Lines:
+    return [*_trial_lines(result), *_point_lines(result), *_gain_lines(result)]
+
+
+def _trial_lines(result: Analysis) -> Lines:
+    """Say first whether the gains can be recommended, and what the runs showed."""
+    if result.structure is None:
+        return []
+    lines: Lines = [(_VERDICTS[result.recommended], result.reason)]
+    if result.verdict.refused:
+        lines.append(("", "no gains are offered for this point; those below are refused"))
+    for trial in result.trials:
+        free = trial.uncontrolled
+        text = f"{trial.start}: {_figures_text(trial.controlled)}"
+        text += f", |u| ≤ {_input_text(result, trial.controlled.max_abs_u)}"
+        if free is not None:
+            text += f"; without control: {_figures_text(free)}"
+        lines.append(("Trial runs" if trial is result.trials[0] else "", text))
+    for mode in result.modes_worse:
+        kind = mode.kind or "mixed"
+        before, after = _root_text(mode.open_loop), _root_text(mode.root)
+        first = mode is result.modes_worse[0]
+        lines.append(("Worse damped" if first else "", f"{kind} mode: {before} becomes {after}"))
+    return lines
+
+
+def _figures_text(found: Figures) -> str:
+    text = found.outcome
+    if found.swing is not None and found.outcome != SETTLES:
+        text += f", swing {found.swing:.3f}"
+    if found.stick_fraction:
+        text += f", stick {found.stick_fraction:.1%}"
+    return text
+
+
+def _input_text(result: Analysis, largest: float) -> str:
+    assert result.structure is not None
+    if result.rig_point is None or result.structure.inputs != ("torque",):
+        return f"{largest:.3g}"
+    newton_metres = largest * result.rig_point.rig.torsional_stiffness
+    return f"{units.from_si(newton_metres, units.TORQUE, 'kN*m'):.3g} kN·m"
+
+
+def _root_text(s: complex) -> str:
+    return f"{s.real:.4g}" + (f" ± {s.imag:.4g}i" if s.imag else "")
+
+
+def _point_lines(result: Analysis) -> Lines:
+    p = result.point
+    lines: Lines = []
+    if result.rig_point is not None:
+        rig_point, steady = result.rig_point, steady_state(result.rig_point)
+        rpm = units.from_si(rig_point.rotary_speed, units.ROTARY_SPEED, "rpm")
+        rop = units.from_si(rig_point.penetration_rate, units.SPEED, "m/hour")
+        lines += [
+            (
+                "Drilling",
+                f"{rpm:.6g} rpm, {rop:.6g} m/h in rock of "
+                f"{rig_point.rig.rock_strength / 1e6:.6g} MPa",
+            ),
+            (
+                "Steady load",
+                f"{steady.weight_on_bit / 1e3:.5g} kN on bit, "
+                f"{steady.torque_on_bit / 1e3:.5g} kN·m on bit, "
+                f"cut {steady.depth_of_cut * 1e3:.4g} mm per turn",
+            ),
+        ]
+    if p is None:
+        plant = result.plant
+        delays = ", ".join(f"{tau:.6g}" for tau in plant.delays) or "none"
+        lines.append(("Plant", f"{plant.order} states; delays {delays}"))
+    else:
+        same = p.xi == p.kappa
+        damping = f"ξ = κ = {p.xi:.6g}" if same else f"ξ = {p.xi:.6g}, κ = {p.kappa:.6g}"
+        text = f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}, "
+        text += f"η = {p.eta:.6g}, {damping}, {p.blades} blades; τ0 = {p.delay:.6g}"
+        lines.append(("Point", text))
+    open_loop = result.open_loop
+    state = "stable" if open_loop.stable else "unstable"
+    if result.structure is not None:
+        lines.append(("Without control", f"{state}, α = {alpha_text(open_loop)}"))
+    return lines
+
+
+def alpha_text(loop: LoopAnalysis) -> str:
+    """Return α with as many digits as rounding of the coefficients leaves."""
+    error = loop.abscissa_error
+    digits = 9 if error < 1e-10 else max(1, -math.floor(math.log10(error)))
+    text = f"{loop.spectral_abscissa:.{min(digits, 9)}f}"
+    return text if error < 1e-10 else f"{text} ± {error:.1g}"
+
+
+def _gain_lines(result: Analysis) -> Lines:
+    structure = result.structure
+    if structure is None:
+        return []
+    outputs = [_SIGNALS.get(name, name) for name in structure.outputs]
+    past = bool(structure.K2_lower.any() or structure.K2_upper.any())
+    law = f"u = K1·({', '.join(outputs)})" if len(outputs) > 1 else f"u = K1·{outputs[0]}"
+    if past:
+        law += " + K2·(the same, τ0 ago)"
+    refused = " (refused)" if result.verdict.refused else ""
+    lines: Lines = [("Feedback", f"{structure.name}{refused}: {law}")]
+    rows = [("K1", "", result.K1, structure.K1_lower, structure.K1_upper)]
+    if past:
+        rows.append(("K2", " delayed", result.K2, structure.K2_lower, structure.K2_upper))
+    for name, when, gains, low, high in rows:
+        for i in range(gains.shape[0]):
+            for j, symbol in enumerate(outputs):
+                text = f"{float(gains[i, j])!r:>22} on {symbol}{when}, "
+                text += f"within [{low[i, j]:g}, {high[i, j]:g}]"
+                if result.case.plant is not None and result.case.rig is not None:
+                    factors, names = gain_units(structure, result.case.plant, result.case.rig)
+                    text += f"  = {gains[i, j] * factors[i, j]:.6g} {names[i][j]}"
+                lines.append((name if j == 0 and i == 0 else "", text))
+    return lines
+
+
+def _loop_lines(result: Analysis, word: str, aims: Lines) -> Lines:
+    loop = result.loop
+    lines: Lines = [("Result", f"{word}{alpha_text(loop)}"), *aims]
+    roots = [
+        f"{root.real:.6f}{f' ± {root.imag:.6f}i' if root.imag else ''}"
+        + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else "")
+        + ("" if root.converged else " (not converged)")
+        for root in loop.dominant_roots
+    ]
+    lines.append(("Dominant roots", ", ".join(roots)))
+    if loop.stable:
+        time = f"to 2 % in {loop.settling_time:.4g} time units"
+        if result.rig_point is not None:
+            seconds = loop.settling_time * result.rig_point.rig.time_scale
+            time += f" = {seconds:.3g} s"
+        lines.append(("Settling", time))
+    check = loop.certificate
+    word = "agrees" if check.agrees else "DOES NOT AGREE"
+    counted = "undecided" if check.counted is None else str(check.counted)
+    right = f"{counted} root(s) right of {check.line:.4g}, {check.found} found"
+    lines.append(("Checked by", f"argument principle {word}: {right}"))
+    radius = result.spectral_radius
+    if radius is not None:
+        lines.append(
+            (
+                "",
+                f"semi-discretisation (m = {radius.m}, order {radius.order}): "
+                f"ρ(D) = {radius.value:.9f}, ln ρ/Δt = {radius.growth_rate:.6f}",
+            )
+        )
+    return lines
+
+
+def _objective_lines(design: Design) -> Lines:
+    """Say what was minimised and required, where that is not the spectral abscissa alone."""
+    lines: Lines = []
+    match design.objective:
+        case SemiDiscrete(m=m, order=order):
+            goal = f"ln ρ(D)/Δt of the semi-discretisation (m = {m}, order {order})"
+        case WorstCase() as case:
+            assert design.point is not None
+            goal = f"largest α of {len(case.around(design.point))} points"
+        case Robust(epsilon=epsilon):
+            goal = f"largest Re s with relative errors of the plant up to {epsilon:g}"
+        case _:
+            goal = ""
+    if goal:
+        lines.append(("Minimised", f"{goal}: {design.objective_value:.9f}"))
+    if design.requirements:
+        wanted = (
+            ("decay rate ≥ {:g}", design.requirements.decay),
+            ("stability radius ≥ {:g}", design.requirements.stability_radius),
+            ("input gain ≤ {:g}", design.requirements.input_gain),
+        )
+        text = ", ".join(form.format(value) for form, value in wanted if value is not None)
+        lines.append(("Required", f"{text}: {'met' if design.requirements_met else 'NOT MET'}"))
+    return lines
