@@ -22,6 +22,7 @@ def spectral_abscissas(
     structure: FeedbackStructure | None = None,
     gains: npt.ArrayLike | None = None,
     workers: int | None = None,
+    feedback_delay: float | None = None,
 ) -> FloatArray:
     """Return α for many operating points, many gains, or both side by side.
 
@@ -38,6 +39,8 @@ def spectral_abscissas(
         Gain vectors of the structure.
     workers : int, optional
         Threads; by default one for each core.
+    feedback_delay : float, optional
+        The controller's; by default it is τ0 of each point.
 
     Returns
     -------
@@ -75,6 +78,9 @@ def spectral_abscissas(
         now, past = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
         a0 = a0 + drive @ now @ measure
         if past.any():
+            if feedback_delay is not None:
+                own = np.full((count, drive.shape[1]), feedback_delay)
+                delay = np.concatenate([np.tile(delay[:, None], left.shape[2]), own], axis=1)
             left = np.concatenate([left, np.broadcast_to(drive, (count, *drive.shape))], axis=2)
             right = np.concatenate([right, past @ measure], axis=1)
     return batch_abscissas(a0, left, right, delay, workers)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
@@ -53,10 +51,8 @@ def point_margins(
 
         def abscissas(errors: FloatArray) -> FloatArray:
             values = getattr(here, name) * (1.0 + errors)
-            return spectral_abscissas(case, {name: values}, feedback, gains)
+            return spectral_abscissas(case, {name: values}, feedback, gains, 1, assumed)
 
-        # Where the delay moves and the controller's does not, a loop has two.
-        two = name == "omega0" and bool(np.any(K2))
-        return parameter_margin(loop_at, limit, abscissas=None if two or late else abscissas)
+        return parameter_margin(loop_at, limit, abscissas=None if late else abscissas)
 
     return {name: margin(name) for name in ("psi", "delta0", "omega0")}

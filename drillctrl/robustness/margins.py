@@ -18,7 +18,7 @@ from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
 
 LONGEST_DELAYS = 10.0
-_AT_ONCE = 25
+_AT_ONCE = 50
 
 
 @dataclass(frozen=True)

@@ -26,14 +26,16 @@ def batch_abscissas(
 ) -> FloatArray:
     """Return the spectral abscissas of q systems X' = A0 X + L R X(t − τ).
 
+    Each of the r delayed signals R X may have a delay of its own.
+
     Parameters
     ----------
     A0 : array, (q, n, n)
         Undelayed matrices.
     left, right : array, (q, n, r) and (q, r, n)
         Factors of the delayed matrices.
-    delay : array, (q,)
-        τ > 0.
+    delay : array, (q,) or (q, r)
+        τ > 0, of all signals or of each.
     workers : int, optional
         Threads; by default one for each core. The result does not depend on it.
 
@@ -48,13 +50,14 @@ def batch_abscissas(
     for name, array, shape in (
         ("left", left, (count, n, right.shape[1])),
         ("right", right, (count, left.shape[2], n)),
-        ("delay", delay, (count,)),
+        ("delay", delay, (count,) if delay.ndim == 1 else (count, left.shape[2])),
     ):
         if array.shape != shape:
             raise InputError(name, f"array of shape {array.shape}", f"of shape {shape}")
     finite = all(np.isfinite(array).all() for array in (A0, left, right, delay))
     if not finite or not (delay > 0).all():
         raise InputError("A0, left, right, delay", "arrays", "finite, with delay > 0")
+    delay = np.broadcast_to(delay.reshape(count, -1), (count, left.shape[2]))
     degrees = _degrees(A0, left, right, delay)
     alpha = np.empty(count)
     jobs = []
@@ -69,13 +72,10 @@ def batch_abscissas(
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         list(pool.map(solve, jobs))
     for row in np.flatnonzero(np.isnan(alpha)):
-        system = DelaySystem(
-            A0[row],
-            (left[row] @ right[row],),
-            (float(delay[row]),),
-            np.zeros((n, 0)),
-            np.zeros((0, n)),
-        )
+        taus = np.unique(delay[row])
+        parts = [left[row][:, delay[row] == t] @ right[row][delay[row] == t] for t in taus]
+        none = np.zeros((n, 0)), np.zeros((0, n))
+        system = DelaySystem(A0[row], tuple(parts), tuple(taus.tolist()), *none)
         alpha[row] = spectral_abscissa(system)
     return alpha
 
@@ -86,7 +86,7 @@ def _degrees(
     """Choose a degree for each system, from few values so that groups are large."""
     total = np.abs(A0) + np.exp(0.5) * np.abs(left @ right)
     bound = np.abs(np.linalg.eigvals(total)).max(axis=1)
-    exact = np.array([degree_for_reach(reach) for reach in bound * delay])
+    exact = np.array([degree_for_reach(reach) for reach in bound * delay.max(axis=1)])
     ladder = np.unique(np.round(4 * 1.15 ** np.arange(40)).astype(int))
     return np.asarray(ladder[np.minimum(np.searchsorted(ladder, exact), ladder.size - 1)])
 
@@ -100,20 +100,19 @@ def _solve(
     size = n + degree * rank
     matrix = np.zeros((count, size, size))
     matrix[:, :n, :n] = A0
-    matrix[:, n:, n:] = past / delay[:, None, None]
-    matrix[:, n:, :n] = present @ (right / delay[:, None, None])
+    matrix[:, n:, n:] = past / np.tile(delay, degree)[:, :, None]
+    matrix[:, n:, :n] = present @ (right / delay[:, :, None])
     matrix[:, :n, size - rank :] += left
     values = np.linalg.eigvals(matrix).astype(complex)
     values = np.where(values.imag >= 0, values, -np.inf)
     order = np.argsort(-values.real, axis=1, kind="stable")[:, :3]
     start = np.take_along_axis(values, order, axis=1)
     s = start[:, :2]
-    delayed = left @ right
     gap = np.abs(s[:, 0] - s[:, 1])
     sure = np.zeros(s.shape, dtype=bool)
     # Two candidates: the collocation may have exchanged the first two.
     for _ in range(4):
-        newton = 1.0 / _log_derivative(A0, delayed, delay, s)
+        newton = 1.0 / _log_derivative(A0, left, right, delay, s)
         with np.errstate(divide="ignore", invalid="ignore"):
             pull = np.where(s.imag > 0, 1.0 / (2j * s.imag), 0.0)
             step = newton / (1.0 - newton * pull)
@@ -138,19 +137,20 @@ def _solve(
 
 
 def _log_derivative(
-    A0: FloatArray, delayed: FloatArray, delay: FloatArray, s: ComplexArray
+    A0: FloatArray, left: FloatArray, right: FloatArray, delay: FloatArray, s: ComplexArray
 ) -> ComplexArray:
     """Return tr(Δ⁻¹ Δ') of each system at its own points, shape (q, k)."""
-    factor = np.exp(-np.maximum(s.real, -1e3 / delay[:, None]) * delay[:, None])
-    factor = factor * np.exp(-1j * s.imag * delay[:, None])
+    late = delay[:, None, :]
+    factor = np.exp(-np.maximum(s.real[..., None], -1e3 / late) * late)
+    factor = factor * np.exp(-1j * s.imag[..., None] * late)
     identity = np.eye(A0.shape[1])
-    term = factor[..., None, None] * delayed[:, None]
-    delta = s[..., None, None] * identity - A0[:, None] - term
-    slope = identity + delay[:, None, None, None] * term
+    arriving = left[:, None] * factor[:, :, None, :]
+    delta = s[..., None, None] * identity - A0[:, None] - arriving @ right[:, None]
+    slope = identity + (arriving * late[:, :, None, :]) @ right[:, None]
     try:
         inverse = np.linalg.inv(delta)
     except np.linalg.LinAlgError:
         # Some s is a root to the last bit; the step from beside it leads back.
         beside = s + 1e-15 * (1.0 + np.abs(s))
-        return _log_derivative(A0, delayed, delay, beside)
+        return _log_derivative(A0, left, right, delay, beside)
     return np.asarray(np.einsum("qkij,qkji->qk", inverse, slope))

@@ -34,6 +34,18 @@ def test_batch_equals_one_by_one(point_c, name):
         assert batch[i] == pytest.approx(spectral_abscissa(loop), abs=1e-11)
 
 
+def test_a_controller_may_keep_its_delay_while_the_plants_moves(point_c):
+    structure = preset_structure("case2")
+    gains, speeds = np.array([-9.0, 3.2, 9.5, -1.0]), np.linspace(1.0, 25.0, 60)
+    batch = spectral_abscissas(
+        point_c, {"omega0": speeds}, structure, gains, feedback_delay=point_c.delay
+    )
+    for speed, found in zip(speeds, batch, strict=True):
+        plant = plant_system(point_c.with_changes(omega0=float(speed)))
+        loop = close_loop(plant, structure, *structure.gains(gains), delay=point_c.delay)
+        assert found == pytest.approx(spectral_abscissa(loop), abs=1e-10)
+
+
 def test_the_number_of_threads_does_not_show(point_c):
     varied = {"delta0": np.linspace(0.1, 12, 2000)}
     one, two = (spectral_abscissas(point_c, varied, workers=w) for w in (1, 2))
