@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
@@ -20,8 +21,8 @@ from drillctrl.designs.mode_shift import ModeShift, mode_shifts
 from drillctrl.designs.trials import Trial
 from drillctrl.designs.verdict import UNTRIED, Verdict, try_gains
 from drillctrl.drilling.case import Case
-from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
 from drillctrl.synthesis.certificate import OptimalityCertificate
 from drillctrl.synthesis.objectives import NO_REQUIREMENTS, Exact, Objective, Requirements
@@ -114,15 +115,26 @@ class Analysis:
             What `uncontrolled_runs` returned for the point.
         """
         verdict = try_gains(
-            self.point,
-            self.structure,
-            self.K1,
-            self.K2,
-            self.stable,
-            known_plant=self.case.plant == paper_plant(),
-            uncontrolled=uncontrolled,
+            self.case, self.structure, self.K1, self.K2, self.stable, uncontrolled=uncontrolled
         )
         return replace(self, verdict=verdict)
+
+    def controller(self, **surroundings: Any) -> Controller:
+        """Return what closes the loop in the simulator, on the plant that it was designed for.
+
+        Parameters
+        ----------
+        **surroundings
+            Attributes of `Controller`: clock, delays, limits and the rest.
+
+        Raises
+        ------
+        InputError
+            If there is no feedback, or a value is out of range.
+        """
+        if self.structure is None:
+            raise InputError("result", "an open loop", "one with feedback")
+        return Controller(self.structure, self.K1, self.K2, plant=self.case.plant, **surroundings)
 
     def prove(self) -> Proof:
         """Prove the number of roots right of the certificate's line; see `prove_count`."""

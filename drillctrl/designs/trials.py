@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import (
@@ -89,20 +90,19 @@ def trial_duration(point: OperatingPoint) -> float:
     return min(max(usual, _SHORTEST), _LONGEST)
 
 
-def trial_run(point: OperatingPoint, controller: Controller | None, start: Start) -> Figures:
+def trial_run(case: Case, controller: Controller | None, start: Start) -> Figures:
     """Return what becomes of one start, with control or without."""
-    found = figures(_run(point, controller, start, _RTOL))
+    found = figures(_run(case, controller, start, _RTOL))
     if found.outcome == UNDECIDED:
-        found = figures(_run(point, controller, start, _FINER))
+        found = figures(_run(case, controller, start, _FINER))
     return found
 
 
-def _run(
-    point: OperatingPoint, controller: Controller | None, start: Start, rtol: float
-) -> Simulation:
+def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -> Simulation:
+    _, point = case.physics("a trial run")
     for most in (_FEW, _MANY):
         run = simulate(
-            point,
+            case,
             controller,
             duration=trial_duration(point),
             initial=start.initial(point),
@@ -114,13 +114,14 @@ def _run(
     return run
 
 
-def uncontrolled_runs(point: OperatingPoint) -> dict[str, Figures]:
+def uncontrolled_runs(where: Where) -> dict[str, Figures]:
     """Return what becomes of every start without control, by its name."""
-    return {start.name: trial_run(point, None, start) for start in STARTS}
+    case = as_case(where)
+    return {start.name: trial_run(case, None, start) for start in STARTS}
 
 
 def trial_runs(
-    point: OperatingPoint,
+    case: Case,
     controller: Controller,
     *,
     uncontrolled: dict[str, Figures] | None = None,
@@ -130,34 +131,34 @@ def trial_runs(
 
     Parameters
     ----------
-    point : OperatingPoint
-        Where the rig drills.
+    case : Case
+        What drills, and where.
     controller : Controller
         With its gains, and whatever limits, delays and clock it has.
     uncontrolled : dict, optional
-        What `uncontrolled_runs` returned for the point.
+        What `uncontrolled_runs` returned for the case.
     spare : bool
         Leave out runs on which no verdict depends: those without control where the controller
         settles, and all further ones once it does harm.
     """
-    return tuple(_trials(point, controller, uncontrolled, spare))
+    return tuple(_trials(case, controller, uncontrolled, spare))
 
 
 def _trials(
-    point: OperatingPoint,
+    case: Case,
     controller: Controller,
     uncontrolled: dict[str, Figures] | None,
     spare: bool,
 ) -> Iterable[Trial]:
     for start in STARTS:
-        mine = trial_run(point, controller, start)
+        mine = trial_run(case, controller, start)
         harm = mine.outcome in (TURNS_BACK, DIVERGES)
         if uncontrolled is not None:
             free = uncontrolled[start.name]
         elif spare and (harm or mine.outcome == SETTLES):
             free = None
         else:
-            free = trial_run(point, None, start)
+            free = trial_run(case, None, start)
         yield Trial(start.name, mine, free)
         if spare and harm:
             return

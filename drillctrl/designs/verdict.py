@@ -9,7 +9,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.trials import Trial, trial_runs
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import (
     BOUNCES,
@@ -23,6 +23,7 @@ from drillctrl.simulation.outcome import (
     UNDECIDED,
     Figures,
 )
+from drillctrl.simulation.structure import structure_of
 
 # Differences between two runs below which they are alike: irregular motions repeat their
 # figures no better.
@@ -76,13 +77,12 @@ UNTRIED = Verdict(None, LEFT_OUT)
 
 
 def try_gains(
-    point: OperatingPoint | None,
+    case: Case,
     structure: FeedbackStructure | None,
     K1: FloatArray,
     K2: FloatArray,
     stable: bool,
     *,
-    known_plant: bool = True,
     uncontrolled: dict[str, Figures] | None = None,
     spare: bool = False,
 ) -> Verdict:
@@ -90,26 +90,26 @@ def try_gains(
 
     Parameters
     ----------
-    point : OperatingPoint or None
-        Where the rig drills; None for a plant of which no nonlinear model is known.
+    case : Case
+        What drills, and where.
     structure, K1, K2
         The feedback.
     stable : bool
         Whether the linear loop is.
-    known_plant : bool
-        Whether the simulator's physics are those of the plant.
     uncontrolled, spare
         As in `trial_runs`.
     """
     if structure is None:
         return Verdict(None, NO_GAINS)
-    if point is None or not known_plant:
+    if not case.drills:
         return Verdict(None, f"{LEFT_OUT}: no nonlinear model of this plant is known")
     try:
         controller = Controller(structure, K1, K2)
+        simulated = structure_of(case)
+        controller.gains(simulated.input_names, simulated.output_names)
     except InputError as error:
         return Verdict(None, f"{LEFT_OUT}: the simulator cannot close this loop ({error})")
-    trials = trial_runs(point, controller, uncontrolled=uncontrolled, spare=spare)
+    trials = trial_runs(case, controller, uncontrolled=uncontrolled, spare=spare)
     return judge(trials, stable)
 
 

@@ -63,6 +63,23 @@ class Part:
         """What the part is apart from its values; a part with settings of its own adds them."""
         return type(self)
 
+    @property
+    def text(self) -> str:
+        """What the part is and its values, in words that do not change from run to run."""
+        inside = [f"{name}={value!r}" for name, value in self.values.items()]
+        inside += [
+            f"{name}={_setting_text(value)}" for name, value in sorted(self.settings.items())
+        ]
+        kind = type(self)
+        return f"{kind.__module__}.{kind.__qualname__}({', '.join(inside)})"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the part was made with beside its parameters."""
+        own = self.__dict__.items()
+        hidden = ("values", "parameters", "quantities")
+        return {n: v for n, v in own if n not in hidden and not n.startswith("_")}
+
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{type(self).__name__} is frozen; use with_values")
 
@@ -81,6 +98,13 @@ class Part:
     def __repr__(self) -> str:
         inside = ", ".join(f"{name}={value:g}" for name, value in self.values.items())
         return f"{type(self).__name__}({inside})"
+
+
+def _setting_text(value: Any) -> str:
+    # A function shows where it is kept in memory, which is never the same.
+    if callable(value) and hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}"
+    return repr(value)
 
 
 def _rebuilt(kind: type[Part], state: dict[str, Any], values: dict[str, float]) -> Part:

@@ -85,6 +85,12 @@ class Plant:
         """What the plant is apart from the values of its parts."""
         return (tuple(part.form for part in self.parts), self.group_names, self.coefficients)
 
+    @property
+    def text(self) -> str:
+        """What the plant consists of, in one line; the same for equal plants in every process."""
+        own = f"{self.coefficients.__module__}.{self.coefficients.__qualname__}"
+        return "; ".join([*(part.text for part in self.parts), own])
+
     def with_values(self, **changes: float) -> Plant:
         """Return the plant with other values of its parts' parameters.
 

@@ -13,6 +13,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.structures import preset_structure
 
 DELAYS = ("fixed", "current")
@@ -75,6 +76,9 @@ class Controller:
         Later gains; times must rise. The delay is how long ago the delayed outputs are from
         then on; without one it is τ0 of the starting point, which is wrong where the rotary
         speed has changed.
+    plant : Plant, optional
+        What the gains were designed for. `simulate` then refuses another one, unless told
+        that it is meant.
 
     Raises
     ------
@@ -95,6 +99,7 @@ class Controller:
     noise: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     schedule: tuple[ScheduleEntry | tuple[Any, ...], ...] = ()
+    plant: Plant | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, value: object) -> None:

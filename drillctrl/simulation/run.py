@@ -93,6 +93,7 @@ def simulate(
     max_step: float = math.inf,
     max_steps: int = 1_000_000,
     time_limit: float = math.inf,
+    other_plant: bool = False,
 ) -> Simulation:
     """Simulate the drill string with state-dependent delay, dry friction and loss of contact.
 
@@ -124,6 +125,8 @@ def simulate(
     time_limit : float
         Seconds of wall time after which it stops with status ``"time limit"``; looked at
         several times a second.
+    other_plant : bool
+        Whether the plant may be another than the one that the controller names.
 
     Returns
     -------
@@ -145,7 +148,11 @@ def simulate(
     if time_limit != math.inf:
         checked_number("time_limit", time_limit, 0.0, open_low=True)
     case = as_case(where)
-    _, point = case.physics("a simulation")
+    plant, point = case.physics("a simulation")
+    meant = None if controller is None else controller.plant
+    if meant is not None and meant != plant and not other_plant:
+        wanted = f"the one that the gains were designed for, {meant.text}, or other_plant=True"
+        raise InputError("plant", plant.text, wanted)
     structure = structure_of(case)
     scenario, duration, rtol, atol, max_steps = checked_run(
         case,

@@ -19,7 +19,7 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import write_text
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.drilling.case import as_case
+from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.grid import Grid
@@ -250,8 +250,8 @@ def campaign(
         checked_number("sharpness", sharpness, 1.001, 10.0)
     if duration is not None:
         checked_number("duration", duration, 1.0, 1e6)
+    states = grid.plant.state_names
     for point in grid.points:
-        states = as_case(point).physics("a campaign")[0].state_names
         for name in kick:
             if name not in states:
                 raise InputError("disturbance", name, f"of {', '.join(states)}")
@@ -259,10 +259,10 @@ def campaign(
             raise InputError("largest", largest, f"such that θ' ≥ −ω0 = {-point.omega0:g}")
     trials = [
         Trial(
-            index, point, _controller_at(controller, point), kick, steps, float(largest),
+            index, case, _controller_at(controller, case), kick, steps, float(largest),
             float(sharpness), duration, cutting, rtol,
         )
-        for index, point in enumerate(grid.points)
+        for index, case in enumerate(grid.cases)
     ]  # fmt: skip
     found = _run(trials, executor, checkpoint, progress)
 
@@ -312,9 +312,10 @@ def _checked_sizes(sizes: Sequence[float]) -> tuple[float, ...]:
     return steps
 
 
-def _controller_at(controller: Controller | GainTable | None, point: Any) -> Controller | None:
+def _controller_at(controller: Controller | GainTable | None, case: Case) -> Controller | None:
     """Return what closes the loop at an operating point."""
     if not isinstance(controller, GainTable):
         return controller
+    _, point = case.physics("a campaign")
     K1, K2 = controller.gains_at(point.omega0, point.delta0, point.psi)
-    return Controller(controller.structure, K1[0], K2[0])
+    return Controller(controller.structure, K1[0], K2[0], plant=controller.grid.plant)

@@ -16,7 +16,7 @@ from drillctrl.designs.margins import point_margins
 from drillctrl.designs.result import Analysis
 from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.trials import uncontrolled_runs
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.structures import as_structure
 from drillctrl.robustness.loop_margins import LoopMargins, loop_margins
 from drillctrl.robustness.margins import ParameterMargin, delay_margin
@@ -36,7 +36,7 @@ REGION = (("omega0", 0.5, 25.0), ("delta0", 0.0, 15.0))
 
 
 def _subjects(
-    point: OperatingPoint | RigPoint,
+    case: Case,
     structures: Sequence[str | FeedbackStructure],
     given: Sequence[Given],
     bounds: Mapping[str, tuple[float, float]] | None,
@@ -44,15 +44,15 @@ def _subjects(
     tell: Callable[[str], None],
 ) -> list[tuple[str, Analysis, bool]]:
     """Design, analyse and try the candidates, the open loop first."""
-    open_loop = analyze(point)
+    open_loop = analyze(case)
     subjects: list[tuple[str, Analysis, bool]] = [(OPEN_LOOP, open_loop, False)]
     free: dict[str, Figures] | None = None
 
     def tried(candidate: Analysis) -> Analysis:
         nonlocal free
-        if not trials or candidate.point is None:
+        if not trials:
             return candidate
-        free = uncontrolled_runs(candidate.point) if free is None else free
+        free = uncontrolled_runs(case) if free is None else free
         return candidate.tried(free)
 
     designed = [as_structure(s) for s in structures]
@@ -67,12 +67,10 @@ def _subjects(
             for name, limits in (bounds or {}).items()
             if name in ("K1", "K2") or name in chosen.entry_names
         }
-        subjects.append(
-            (chosen.name, tried(design(point, chosen, bounds=mine, trials=False)), True)
-        )
+        subjects.append((chosen.name, tried(design(case, chosen, bounds=mine, trials=False)), True))
     for label, structure, K1, K2 in given:
         tell(f"analysis of {label}")
-        subjects.append((label, tried(analyze(point, structure, K1, K2)), False))
+        subjects.append((label, tried(analyze(case, structure, K1, K2)), False))
     labels = [label for label, _, _ in subjects]
     if len(set(labels)) < len(labels):
         raise InputError("structures", labels[1:], f"different names, none of them {OPEN_LOOP}")
@@ -80,7 +78,7 @@ def _subjects(
 
 
 def compare(
-    point: OperatingPoint | RigPoint,
+    point: Where,
     structures: Sequence[str | FeedbackStructure] = ("p", "case1", "pd", "case2"),
     *,
     given: Sequence[Given] = (),
@@ -96,8 +94,8 @@ def compare(
 
     Parameters
     ----------
-    point : OperatingPoint or RigPoint
-        Where the rig drills.
+    point : OperatingPoint, RigPoint or Case
+        What drills, and where.
     structures : sequence of str or FeedbackStructure
         Structures to design gains for.
     given : sequence of (label, structure, K1, K2)
@@ -129,6 +127,8 @@ def compare(
         If a name is unknown or used twice, or a number is out of range.
     """
     began = time.perf_counter()
+    case = as_case(point)
+    case.physics("a comparison")
     if sort not in SORTS:
         raise InputError("sort", sort, f"one of {', '.join(SORTS)}")
     checked_number("duration", duration, 0.0, 1e5, open_low=True)
@@ -145,9 +145,9 @@ def compare(
 
     rows: list[Row] = []
     area = None
-    for label, subject, designed in _subjects(point, structures, given, bounds, trials, tell):
+    for label, subject, designed in _subjects(case, structures, given, bounds, trials, tell):
         tell(f"measures of {label}")
-        chart = _chart(point, subject, region)
+        chart = _chart(case, subject, region)
         if label == OPEN_LOOP and chart is not None:
             area = chart.stable_area
         rows.append(
@@ -170,7 +170,7 @@ def compare(
         progress("done", steps, steps)
     rows.sort(key=lambda row: _rank(row, sort))
     elapsed = time.perf_counter() - began
-    return Comparison(point, tuple(rows), sort, pushed, duration, elapsed)
+    return Comparison(case, tuple(rows), sort, pushed, duration, elapsed)
 
 
 def _point_margins(subject: Analysis) -> dict[str, ParameterMargin] | None:
@@ -189,7 +189,7 @@ def _margins(subject: Analysis) -> LoopMargins | None:
 
 
 def _chart(
-    point: OperatingPoint | RigPoint,
+    case: Case,
     subject: Analysis,
     region: tuple[tuple[str, float, float], tuple[str, float, float]] | None,
 ) -> StabilityChart | None:
@@ -198,8 +198,8 @@ def _chart(
     from drillctrl.charts.chart import chart
 
     if subject.structure is None:
-        return chart(point, *region)
-    return chart(point, *region, subject.structure, subject.K1, subject.K2)
+        return chart(case, *region)
+    return chart(case, *region, subject.structure, subject.K1, subject.K2)
 
 
 def _rank(row: Row, sort: str) -> float:

@@ -13,7 +13,8 @@ from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
 from drillctrl.designs.result import Analysis
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.case import Case
+from drillctrl.drilling.point import OperatingPoint
 from drillctrl.robustness.loop_margins import LoopMargins
 from drillctrl.robustness.margins import DelayMargin, ParameterMargin
 from drillctrl.robustness.radius import StabilityRadius
@@ -177,8 +178,8 @@ class Comparison:
 
     Attributes
     ----------
-    point : OperatingPoint or RigPoint
-        Where they were compared.
+    case : Case
+        What drills, and where they were compared.
     rows : tuple of Row
         Best first by ``sort``; those without the measure last.
     sort : str
@@ -191,7 +192,7 @@ class Comparison:
         Wall time.
     """
 
-    point: OperatingPoint | RigPoint
+    case: Case
     rows: tuple[Row, ...]
     sort: str
     disturbance: Mapping[str, float]
@@ -257,8 +258,7 @@ class Comparison:
         )
 
     def _operating_point(self) -> OperatingPoint:
-        given = self.point
-        return given.operating_point() if isinstance(given, RigPoint) else given
+        return self.case.physics("a comparison")[1]
 
     def _point_text(self) -> str:
         """Say where the candidates were compared."""

@@ -49,7 +49,7 @@ def respond(
     if design.structure is not None:
         controller = Controller(design.structure, design.K1, design.K2)
     run = simulate(
-        design.point, controller, duration=duration, initial=disturbance, model=model, rtol=1e-7
+        design.case, controller, duration=duration, initial=disturbance, model=model, rtol=1e-7
     )
     motion = run.on_steps(9)
     inputs = max(float(np.abs(motion.axial).max()), float(np.abs(motion.torque).max()))

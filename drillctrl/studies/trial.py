@@ -11,8 +11,7 @@ import numpy as np
 
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.case import plant_system
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case
 from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
@@ -33,8 +32,8 @@ class Trial:
     ----------
     index : int
         Of the point.
-    point : OperatingPoint
-        Where the rig drills steadily.
+    case : Case
+        What drills, and where.
     controller : Controller or None
         Closes the loop.
     disturbance : mapping
@@ -53,7 +52,7 @@ class Trial:
     """
 
     index: int
-    point: OperatingPoint
+    case: Case
     controller: Controller | None
     disturbance: Mapping[str, float]
     sizes: tuple[float, ...]
@@ -66,14 +65,17 @@ class Trial:
     @property
     def key(self) -> str:
         """Hash of all that the result depends on."""
-        parts: list[Any] = [getattr(self, f.name) for f in fields(self) if f.name != "controller"]
+        apart = ("controller", "case")
+        parts: list[Any] = [getattr(self, f.name) for f in fields(self) if f.name not in apart]
+        plant, point = self.case.physics("a campaign")
+        parts += [plant.text, point]
         if self.controller is not None:
             feedback = self.controller.feedback
             assert isinstance(feedback, FeedbackStructure)
             parts += [feedback.inputs, feedback.outputs]
             parts += [array.tolist() for array in self.controller.gain_sets()]
             parts.append(self.controller.delays(0.0).tolist())
-            own = ("feedback", "K1", "K2", "schedule")
+            own = ("feedback", "K1", "K2", "schedule", "plant")
             parts += [
                 getattr(self.controller, f.name)
                 for f in fields(self.controller)
@@ -89,7 +91,7 @@ def try_point(trial: Trial) -> dict[str, Any]:
     smallest that did not; None for the second if the largest allowed one settled too, and
     twice None where there is no basin to look for or its runs would be too long.
     """
-    alpha = linear_abscissa(trial.point, trial.controller)
+    alpha = linear_abscissa(trial.case, trial.controller)
     duration = trial.duration
     if duration is None:
         # No decay, no need to wait for it.
@@ -110,16 +112,17 @@ def try_point(trial: Trial) -> dict[str, Any]:
     }
 
 
-def linear_abscissa(point: OperatingPoint, controller: Controller | None) -> float:
+def linear_abscissa(case: Case, controller: Controller | None) -> float:
     """Return α of the linear loop with an ideal controller."""
     if controller is None:
-        return spectral_abscissa(plant_system(point))
+        return spectral_abscissa(case.system(()))
     feedback = controller.feedback
     assert isinstance(feedback, FeedbackStructure)
-    plant = plant_system(point, inputs=feedback.inputs)
-    return spectral_abscissa(
-        close_loop(plant, feedback, controller.K1, controller.K2, delay=point.delay)
+    _, point = case.physics("a campaign")
+    loop = close_loop(
+        case.system(feedback.inputs), feedback, controller.K1, controller.K2, delay=point.delay
     )
+    return spectral_abscissa(loop)
 
 
 def _basin(trial: Trial, alpha: float, duration: float, outcomes: list[str]) -> list[float | None]:
@@ -139,7 +142,7 @@ def _outcome(trial: Trial, alpha: float, duration: float, size: float) -> tuple[
     """Simulate; return what became of it and the settling time."""
     start = {name: size * value for name, value in trial.disturbance.items()}
     run = simulate(
-        trial.point,
+        trial.case,
         trial.controller,
         duration=duration,
         initial=start,

@@ -13,7 +13,6 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.loops import spectral_abscissas
-from drillctrl.drilling.case import plant_system
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.measures import worst_case
@@ -142,7 +141,7 @@ def _abscissas(
         vectors[own] = cells.gains[index[own]]
     groups = grid.groups(coordinates)
     parameters = dict(zip(("omega0", "delta0", "psi"), groups.T, strict=True))
-    first = grid.point(*(axis.values[0] for axis in grid.axes))
+    first = grid.case(*(axis.values[0] for axis in grid.axes))
     return spectral_abscissas(first, parameters, structure, vectors)
 
 
@@ -194,7 +193,7 @@ def _constant_gains(
     lattice = _lattice(grid)
     coordinates = to_coordinates(grid, np.tile(origin, (len(lattice), 1)), lattice)
     families = [
-        loop_family(plant_system(grid.point(*row), structure.inputs), structure)
+        loop_family(grid.case(*row).system(structure.inputs), structure)
         for row in coordinates.tolist()
     ]
     worst = worst_case(families)

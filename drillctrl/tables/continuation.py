@@ -70,8 +70,8 @@ def design_grid(
     found = dict(known or {})
     if not isinstance(objective, Exact):
         alone = [
-            NodeTask(i, point, structure, seed, objective=objective)
-            for i, point in enumerate(grid.points)
+            NodeTask(i, case, structure, seed, objective=objective)
+            for i, case in enumerate(grid.cases)
             if i not in found
         ]
         designs = [*found.values(), *run(design_node, alone)]
@@ -89,7 +89,7 @@ def design_grid(
         tasks = []
         for i in chosen:
             gains, active = _nearby(grid.shape, i, stride, found, apart)
-            tasks.append(NodeTask(i, grid.points[i], structure, seed, gains, active=active))
+            tasks.append(NodeTask(i, grid.cases[i], structure, seed, gains, active=active))
         tried.update(map(_key, tasks))
         found.update({design.index: design for design in run(design_node, tasks)})
         stride //= 2
@@ -198,7 +198,7 @@ def _restarts(
     own = np.array([found[i].spectral_abscissa for i in range(len(grid.points))])
     groups = np.array([[p.omega0, p.delta0, p.psi] for p in grid.points])[pairs[:, 0]]
     borrowed = spectral_abscissas(
-        grid.points[0],
+        grid.cases[0],
         {"omega0": groups[:, 0], "delta0": groups[:, 1], "psi": groups[:, 2]},
         structure,
         gains[pairs[:, 1]],
@@ -218,7 +218,7 @@ def _restarts(
         better = pairs[promise & (pairs[:, 0] == index), 1][:_MOST_KNOWN].tolist()
         known = tuple(gains[j] for j in better)
         active = tuple(found[j].roots for j in better)
-        tasks.append(NodeTask(index, grid.points[index], structure, seed, known, active=active))
+        tasks.append(NodeTask(index, grid.cases[index], structure, seed, known, active=active))
     return tasks
 
 
@@ -232,7 +232,7 @@ def _searches(
         relative * np.abs(alpha), absolute
     )
     return [
-        NodeTask(index, grid.points[index], structure, seed)
+        NodeTask(index, grid.cases[index], structure, seed)
         for index in np.flatnonzero(doubtful).tolist()
     ]
 

@@ -16,7 +16,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure, Tie
 from drillctrl.drilling.gain_units import rig_gain_units
-from drillctrl.drilling.plant import paper_plant
+from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.tables.grid import MAX_NODES, Axis, Grid
@@ -73,8 +73,9 @@ def to_document(table: GainTable) -> Document:
         "axes": {axis.name: list(axis.values) for axis in table.grid.axes},
         "reference": {
             "kind": "point" if rig is None else "rig",
-            "values": dataclasses.asdict(table.grid.reference),
+            "values": plain_values(table.grid.reference),
         },
+        "plant": table.grid.plant.text,
         "structure": {
             "name": structure.name,
             "outputs": list(structure.outputs),
@@ -117,7 +118,7 @@ def _columns(table: GainTable) -> tuple[dict[str, FloatArray], dict[str, str]]:
         units["delay_s"] = "s"
         for name, (factor, unit), values in zip(
             structure.entry_names,
-            rig_gain_units(structure, paper_plant(), rig) or [],
+            rig_gain_units(structure, table.grid.plant, rig) or [],
             table.entries.T,
             strict=False,
         ):
@@ -156,8 +157,14 @@ def checked_layout(header: dict[str, Any]) -> tuple[int, list[str]]:
     return rows, names
 
 
-def from_document(document: Document) -> GainTable:
-    """Return the table that a file holds.
+def plain_values(reference: OperatingPoint | Rig) -> dict[str, Any]:
+    """Return the numbers of a point or a rig; what a rig knows of its string is in the plant."""
+    kind = Rig if isinstance(reference, Rig) else OperatingPoint
+    return {item.name: getattr(reference, item.name) for item in dataclasses.fields(kind)}
+
+
+def from_document(document: Document, plant: Plant) -> GainTable:
+    """Return the table that a file holds, of a plant.
 
     Raises
     ------
@@ -174,10 +181,13 @@ def from_document(document: Document) -> GainTable:
             raise ValueError(f"a {name} that is not finite")
     if header.get("checksum") != checksum(header, columns):
         raise ValueError("a wrong checksum")
-    structure = _read_structure(header["structure"])
+    if header["plant"] != plant.text:
+        made = str(header["plant"])[:_LONGEST_WORDS]
+        raise ValueError(f"gains for another plant, to be given when it is loaded: {made}")
+    structure = _read_structure(header["structure"], plant)
     kind = {"point": OperatingPoint, "rig": Rig}[header["reference"]["kind"]]
     axes = [Axis(name, tuple(values)) for name, values in header["axes"].items()]
-    grid = Grid((axes[0], axes[1], axes[2]), kind(**header["reference"]["values"]))
+    grid = Grid((axes[0], axes[1], axes[2]), kind(**header["reference"]["values"]), plant)
     gains = np.column_stack([columns[name] for name in structure.entry_names])[:, structure.free]
     _check_gains(structure, gains)
     if header["fallback"] not in FALLBACKS:
@@ -216,10 +226,10 @@ def _read_refusals(given: dict[str, Any], rows: int) -> dict[int, str]:
     return found
 
 
-def _read_structure(layout: dict[str, Any]) -> FeedbackStructure:
+def _read_structure(layout: dict[str, Any], plant: Plant) -> FeedbackStructure:
     for what, known in (
-        ("outputs", paper_plant().output_names),
-        ("inputs", paper_plant().input_names),
+        ("outputs", plant.output_names),
+        ("inputs", plant.input_names),
     ):
         names = layout[what]
         if not (1 <= len(names) <= len(known) and set(names) <= set(known)):

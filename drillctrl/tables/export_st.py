@@ -8,7 +8,6 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.base.templates import filled
 from drillctrl.drilling.gain_units import rig_gain_units
-from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.quantities import SI_UNITS
 from drillctrl.tables.reserved import is_identifier
 from drillctrl.tables.sampled import sampled_controller
@@ -60,7 +59,7 @@ def export_st(
     name = Path(path).stem
     check_st_name(name)
     controller = sampled_controller(table, name, period, limit, ramp)
-    structure, plant, rig = table.structure, paper_plant(), table.grid.rig
+    structure, plant, rig = table.structure, table.grid.plant, table.grid.rig
     gain_units = rig_gain_units(structure, plant, rig)
     si = {name: SI_UNITS[plant.quantity(name)] for name in (*structure.outputs, *structure.inputs)}
     outputs, depth = len(structure.outputs), int(controller.words["depth"])

@@ -16,6 +16,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 from drillctrl.base.tableio import csv_text
+from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
 from drillctrl.tables.table import GainTable
 
@@ -51,29 +52,39 @@ def save_table(table: GainTable, path: str | Path) -> None:
         _FORMATS[Path(path).suffix.lower()][0](document, file)
 
 
-def load_table(path: str | Path) -> GainTable:
+def load_table(path: str | Path, plant: Plant | None = None) -> GainTable:
     """Read a table that `save_table` wrote.
 
     Nothing in a file is ever executed. What is announced is compared with limits before
     anything that large is read.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    plant : Plant, optional
+        What the gains were designed for, which a file names but cannot hold; by default the
+        paper's.
+
     Raises
     ------
     InputError
-        If there is no such file, or it is truncated, changed, or no table at all.
+        If there is no such file, it is truncated, changed, or no table at all, or its gains
+        were designed for another plant.
     """
     check_table_path(path)
     source = Path(path)
     try:
         if source.stat().st_size > MAX_BYTES:
             raise ValueError("a file of more than 1 GB")
-        return from_document(_FORMATS[source.suffix.lower()][1](source))
+        document = _FORMATS[source.suffix.lower()][1](source)
+        return from_document(document, paper_plant() if plant is None else plant)
     except OSError as error:
         reason = error.strerror or "not in the format of its ending"
         raise InputError("table", str(path), f"a readable file ({reason})") from None
     except Exception as error:
         # The readers of other packages raise whatever a broken file makes them raise.
-        reason = " ".join(f"{type(error).__name__} {error}".split())[:200]
+        reason = " ".join(f"{type(error).__name__} {error}".split())[:400]
         raise InputError("table", str(path), f"an intact gain table ({reason})") from None
 
 

@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.drilling.case import Case, as_case
+from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.steady import rig_point_at_weight_on_bit, weight_on_bit
@@ -107,6 +109,8 @@ class Grid:
         fastest among the nodes.
     reference : OperatingPoint or Rig
         What does not vary: η, ξ, κ and n of a dimensionless grid, the rig of the others.
+    plant : Plant
+        What drills there; by default the paper's, with the string that the rig may have.
 
     Raises
     ------
@@ -116,8 +120,12 @@ class Grid:
 
     axes: tuple[Axis, Axis, Axis]
     reference: OperatingPoint | Rig
+    plant: Plant = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
+        if self.plant is None:
+            parts = {} if self.rig is None else self.rig.hardware()
+            object.__setattr__(self, "plant", paper_plant(**parts))
         names = tuple(axis.name for axis in self.axes)
         fitting = (DIMENSIONLESS,) if self.rig is None else (RATE, WEIGHT)
         if names not in fitting:
@@ -147,6 +155,15 @@ class Grid:
     def points(self) -> tuple[OperatingPoint, ...]:
         """Operating points of all nodes."""
         return tuple(self.point(*row) for row in self.coordinates.tolist())
+
+    @functools.cached_property
+    def cases(self) -> tuple[Case, ...]:
+        """What drills at all nodes."""
+        return tuple(Case(self.plant, point) for point in self.points)
+
+    def case(self, speed: float, feed: float, rock: float) -> Case:
+        """Return what drills at coordinates on the three axes."""
+        return Case(self.plant, self.point(speed, feed, rock))
 
     def point(self, speed: float, feed: float, rock: float) -> OperatingPoint:
         """Return the operating point at coordinates on the three axes."""
@@ -193,7 +210,7 @@ def dimensionless_grid(
     omega0: Axis | float,
     delta0: Axis | float,
     psi: Axis | float = 14.0,
-    reference: OperatingPoint | None = None,
+    reference: OperatingPoint | Case | None = None,
 ) -> Grid:
     """Return a grid over dimensionless groups.
 
@@ -201,20 +218,26 @@ def dimensionless_grid(
     ----------
     omega0, delta0, psi : Axis or float
         A number stands for an axis with one value.
-    reference : OperatingPoint, optional
-        Supplies the other groups; by default those of `OperatingPoint`.
+    reference : OperatingPoint or Case, optional
+        Supplies the other groups and the plant; by default those of `OperatingPoint`, and the
+        paper's.
     """
+    case = None if reference is None else as_case(reference)
+    plant = None if case is None else case.physics("a grid")[0]
     axes = [_as_axis(*pair) for pair in zip(DIMENSIONLESS, (omega0, delta0, psi), strict=True)]
     first = [axis.values[0] for axis in axes]
-    if reference is None:
-        reference = OperatingPoint(first[0], first[1], first[2])
+    here = (
+        OperatingPoint(first[0], first[1], first[2])
+        if case is None or case.point is None
+        else case.point
+    )
     # The node-dependent groups of the reference say nothing; one grid has one reference.
-    reference = replace(reference.with_changes(psi=first[2]), omega0=first[0], delta0=first[1])
-    return Grid((axes[0], axes[1], axes[2]), reference)
+    here = replace(here.with_changes(psi=first[2]), omega0=first[0], delta0=first[1])
+    return Grid((axes[0], axes[1], axes[2]), here, plant or paper_plant())
 
 
 def rig_grid(
-    rig: Rig,
+    rig: Rig | RigPoint | Case,
     rotary_speed: Axis | float,
     *,
     penetration_rate: Axis | float | None = None,
@@ -225,8 +248,8 @@ def rig_grid(
 
     Parameters
     ----------
-    rig : Rig
-        Drill string and bit.
+    rig : Rig, RigPoint or Case
+        Drill string and bit; a case brings its plant.
     rotary_speed : Axis or float
         rad/s.
     penetration_rate, weight_on_bit : Axis or float
@@ -241,12 +264,20 @@ def rig_grid(
     """
     if (penetration_rate is None) == (weight_on_bit is None):
         raise InputError("penetration_rate", penetration_rate, "given, or else weight_on_bit")
+    plant = None
+    if not isinstance(rig, Rig):
+        case = as_case(rig)
+        plant, found = case.physics("a grid")[0], case.rig
+        if found is None:
+            raise InputError("rig", "a case without a rig", "a Rig, or a Case of a RigPoint")
+        rig = found
     names = RATE if weight_on_bit is None else WEIGHT
     feed = penetration_rate if penetration_rate is not None else weight_on_bit
     assert feed is not None
     rock = rig.rock_strength if rock_strength is None else rock_strength
     axes = [_as_axis(*pair) for pair in zip(names, (rotary_speed, feed, rock), strict=True)]
-    return Grid((axes[0], axes[1], axes[2]), rig)
+    parts = {} if plant is not None else rig.hardware()
+    return Grid((axes[0], axes[1], axes[2]), rig, plant or paper_plant(**parts))
 
 
 def _as_axis(name: str, given: Axis | float) -> Axis:

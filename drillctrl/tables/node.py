@@ -15,8 +15,7 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
 from drillctrl.designs.loop_analysis import analyze_loop
 from drillctrl.designs.verdict import try_gains
-from drillctrl.drilling.case import plant_system
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.case import Case
 from drillctrl.synthesis.certificate import certify_optimality
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, Exact, Objective
@@ -47,8 +46,8 @@ class NodeTask:
     ----------
     index : int
         Of the node.
-    point : OperatingPoint
-        Where it is.
+    case : Case
+        What drills there.
     structure : FeedbackStructure
         With its bounds.
     seed : int
@@ -64,7 +63,7 @@ class NodeTask:
     """
 
     index: int
-    point: OperatingPoint
+    case: Case
     structure: FeedbackStructure
     seed: int
     known: tuple[FloatArray, ...] = ()
@@ -109,7 +108,7 @@ def design_node(task: NodeTask) -> NodeDesign:
     """
     if not isinstance(task.objective, Exact):
         return _design_otherwise(task)
-    family = loop_family(plant_system(task.point, task.structure.inputs), task.structure)
+    family = loop_family(task.case.system(task.structure.inputs), task.structure)
     # A sharpening step that overshoots far left overflows; what it finds is then refused.
     with np.errstate(over="ignore", invalid="ignore"):
         search = _followed(family, task) or _searched(family, task)
@@ -154,9 +153,8 @@ def _searched(family: LoopFamily, task: NodeTask) -> Search:
 def _design_otherwise(task: NodeTask) -> NodeDesign:
     """Minimise another objective than the abscissa, by the same route as `design`."""
     result = design(
-        task.point, task.structure, objective=task.objective, seed=task.seed, trials=False
+        task.case, task.structure, objective=task.objective, seed=task.seed, trials=False
     )
-    assert result.optimality is not None
     return NodeDesign(
         task.index,
         task.structure.vector(result.K1, result.K2),
@@ -184,12 +182,12 @@ class NodeCheck:
 def check_node(task: NodeTask) -> NodeCheck:
     """Analyse the loop that the first known gains close at a node, and try them if asked."""
     structure, gains = task.structure, task.known[0]
-    family = loop_family(plant_system(task.point, structure.inputs), structure)
+    family = loop_family(task.case.system(structure.inputs), structure)
     loop = analyze_loop(family.loop(gains))
     off = no_control(structure)
     refusal = None
     if task.trials and (gains != off).any():
-        verdict = try_gains(task.point, structure, *structure.gains(gains), loop.stable, spare=True)
+        verdict = try_gains(task.case, structure, *structure.gains(gains), loop.stable, spare=True)
         if verdict.refused:
             refusal, loop = verdict.reason, analyze_loop(family.loop(off))
     return NodeCheck(
@@ -253,7 +251,8 @@ def task_key(task: NodeTask) -> str:
     }
     ties = [dataclasses.astuple(tie) for tie in task.structure.ties]
     known = [gains.tolist() for gains in task.known]
-    point = dataclasses.astuple(task.point)
+    plant, where = task.case.physics("a table")
+    point = (*dataclasses.astuple(where), plant.text)
     active = [[dataclasses.astuple(root) for root in roots] for roots in task.active]
     rest = task.seed, known, active, task.objective
     text = repr((task.index, point, structure, ties, *rest))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import textwrap
 from dataclasses import dataclass
@@ -13,8 +12,7 @@ import numpy as np
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import rig_gain_units
-from drillctrl.drilling.plant import paper_plant
-from drillctrl.tables.document import to_document
+from drillctrl.tables.document import plain_values, to_document
 from drillctrl.tables.grid import DIMENSIONLESS, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
 from drillctrl.tables.table import GainTable
@@ -104,12 +102,12 @@ def checked_sampling(
     step = checked_number("period", period, 0.0, 1e6, open_low=True)
     bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
     # The words go into comments, which other names might end.
-    known = paper_plant().output_names
+    known = grid.plant.output_names
     if not set(structure.outputs) <= set(known):
         raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(known)}")
     if len(structure.inputs) != 1:
         raise InputError("structure", structure.name, "one with a single input")
-    if grid.rig is not None and rig_gain_units(structure, paper_plant(), grid.rig) is None:
+    if grid.rig is not None and rig_gain_units(structure, grid.plant, grid.rig) is None:
         raise InputError("structure", structure.name, "torque fed back from θ and θ'")
     longest = max(point.delay for point in grid.points)
     longest *= grid.rig.time_scale if grid.rig is not None else 1.0
@@ -140,13 +138,13 @@ def sampled_controller(
     """
     grid, structure, rig = table.grid, table.structure, table.grid.rig
     step, bound, depth, count = checked_sampling(grid, structure, period, limit, ramp)
-    factors = rig_gain_units(structure, paper_plant(), rig)
+    factors = rig_gain_units(structure, grid.plant, rig)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
     constant = mode == CONSTANT
     listed = np.where(constant, np.cumsum(constant), np.where(mode == UNSAFE, -1, 0))
     bounds = zip(structure.entry_names, structure.flat_lower, structure.flat_upper, strict=True)
-    groups = dataclasses.asdict(table.grid.reference)
+    groups = plain_values(table.grid.reference)
     # Those that vary over the grid are axes, and λ does with ψ.
     varying = (*DIMENSIONLESS, "lam", "rock_strength")
     given = {k: v for k, v in groups.items() if k not in varying}

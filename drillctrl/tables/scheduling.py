@@ -98,4 +98,11 @@ def scheduled(
         )
         for i, t in enumerate(times, 1)
     )
-    return Controller(table.structure, K1[0], K2[0], schedule=entries, **options)  # type: ignore[arg-type]
+    return Controller(
+        table.structure,
+        K1[0],
+        K2[0],
+        schedule=entries,
+        plant=table.grid.plant,
+        **options,  # type: ignore[arg-type]
+    )

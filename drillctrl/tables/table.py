@@ -384,8 +384,8 @@ def table(
         if fallback == "off":
             gains = np.where((best < 0.0)[:, None], gains, no_control(chosen))
         tasks = [
-            NodeTask(i, p, chosen, seed, (gains[i],), trials=bool(trials))
-            for i, p in enumerate(grid.points)
+            NodeTask(i, case, chosen, seed, (gains[i],), trials=bool(trials))
+            for i, case in enumerate(grid.cases)
         ]
         checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
         refusals = {check.index: check.refusal for check in checks if check.refusal is not None}

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drillctrl import OperatingPoint, design, dimensionless_grid, linear_axis
+from drillctrl import OperatingPoint, as_case, design, dimensionless_grid, linear_axis
 from drillctrl.drilling.structures import preset_structure
 from drillctrl.tables.continuation import design_grid, excess
 from drillctrl.tables.node import NodeDesign, NodeTask, design_node
@@ -53,7 +53,7 @@ def test_a_descent_leaves_the_bounds_that_its_neighbours_gains_lie_on():
     structure = preset_structure("case2")
     known = structure.vector(beside.K1, beside.K2)
     assert known.min() == structure.lower.min()
-    found = design_node(NodeTask(0, point, structure, 0, (known,)))
+    found = design_node(NodeTask(0, as_case(point), structure, 0, (known,)))
     # No worse than a design from scratch: a neighbour's gains may lead to a better end.
     assert found.spectral_abscissa < 0.999 * design(point, "case2").spectral_abscissa
 
