@@ -19,7 +19,7 @@ IntArray = npt.NDArray[np.intp]
 # Places on the circle that no loop has a reason to be critical at; several in case one is.
 _PLACES = np.exp(1j * np.array([2.347, 0.911, -1.653]))
 _NEAR_CIRCLE = 1e-3
-_NEAR_AXIS = 0.03
+_NEAR_AXIS = 1e-3
 
 
 def critical_points(
@@ -54,7 +54,11 @@ def critical_points(
     late = left @ right
     roots = np.linalg.eigvals(A0[rows] + found[:, None, None] * late[rows])
     size = np.abs(A0).max(axis=(1, 2), initial=0.0)[rows, None]
-    near = (np.abs(roots.real) < _NEAR_AXIS * (np.abs(roots) + 1e-3 * size)) & (roots.imag > 0)
+    away = np.abs(roots.real) / (np.abs(roots) + 1e-3 * size)
+    away = np.where(roots.imag > 0, away, np.inf)
+    # Of many roots beside the axis, as a lightly damped string has, one is on it.
+    least = away.min(axis=1, keepdims=True, initial=np.inf)
+    near = (away < _NEAR_AXIS) & (away < 10.0 * least + 1e-6)
     which, columns = np.nonzero(near)
     omega = np.asarray(roots[which, columns].imag, dtype=float)
     phase = -np.angle(found[which])
