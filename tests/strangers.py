@@ -46,6 +46,10 @@ def chain(c, count=40):
     )
 
 
+def short_chain(c):
+    return chain(c, 8)
+
+
 PLANTS = {
     "velocity-weakening law": (paper_plant(bit=VelocityWeakening()), "case1"),
     "third inertia, surface output": (paper_plant(string=third_inertia), "case1"),

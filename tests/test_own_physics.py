@@ -18,6 +18,7 @@ from drillctrl import (
     dimensionless_grid,
     linear_axis,
     load_table,
+    paper_plant,
     report,
     save_table,
     simulate,
@@ -25,7 +26,7 @@ from drillctrl import (
 )
 from drillctrl.tables.export_c import export_c
 from drillctrl.tables.export_st import export_st
-from tests.strangers import PLANTS, third_inertia
+from tests.strangers import PLANTS, VelocityWeakening, short_chain, third_inertia
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 
@@ -94,12 +95,13 @@ def test_table_files_and_exports(stranger, tmp_path):
     )
 
 
-def test_compare(stranger):
-    case, result = stranger
-    given = [("gains", result.structure, result.K1, result.K2)]
-    found = compare(case, (), given=given, duration=10.0, region=None, trials=False)
+@pytest.mark.parametrize("bit_or_string", [{"bit": VelocityWeakening()}, {"string": short_chain}])
+def test_compare(bit_or_string):
+    case = as_case(POINT, paper_plant(**bit_or_string))
+    found = compare(case, ("pd",), duration=10.0, region=None, trials=False)
     rows = {row.label: row for row in found.rows}
-    assert rows["gains"].result.spectral_abscissa == result.spectral_abscissa
+    alone = design(case, "pd", trials=False)
+    assert rows["pd"].result.spectral_abscissa == alone.spectral_abscissa
     assert rows["none"].result.spectral_abscissa == analyze(case).spectral_abscissa
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _COARSEST = 0.02
 _MAX_POINTS = 20_000
+# Entries of matrices that are held at once.
+_AT_ONCE = 100_000
 
 
 def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArray:
@@ -39,9 +41,7 @@ def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArra
     points = np.atleast_1d(np.asarray(omega, dtype=float))
     if not np.isfinite(points).all():
         raise InputError("omega", "an array with NaN or infinity", "finite")
-    delta = characteristic.matrix(system, 1j * points)
-    inputs = np.broadcast_to(system.B.astype(complex), (points.size, *system.B.shape))
-    response = system.C @ np.linalg.solve(delta, inputs)
+    response = system.C @ _responses(system, system.B, points)
     return np.asarray(np.moveaxis(response, 0, -1))
 
 
@@ -73,11 +73,25 @@ def loop_transfer(
     now, past = gain_matrices(structure, K1, K2)
     drive, measure = loop_channels(system, structure)
     points = np.atleast_1d(np.asarray(omega, dtype=float))
-    delta = characteristic.matrix(system, 1j * points)
-    inputs = np.broadcast_to(drive.astype(complex), (points.size, *drive.shape))
     lag = np.exp(-1j * points * system.max_delay)[:, None, None]
-    transfer = -(now + past * lag) @ measure @ np.linalg.solve(delta, inputs)
+    transfer = -(now + past * lag) @ measure @ _responses(system, drive, points)
     return np.asarray(np.moveaxis(transfer, 0, -1))
+
+
+def _responses(system: DelaySystem, drive: FloatArray, omega: FloatArray) -> ComplexArray:
+    """Return Δ(iω)⁻¹ B for every ω, (q, n, m), without holding all Δ at once."""
+    found = [
+        np.linalg.solve(
+            characteristic.matrix(system, 1j * some),
+            np.broadcast_to(drive.astype(complex), (some.size, *drive.shape)),
+        )
+        for some in _portions(system, omega)
+    ]
+    return np.concatenate(found)
+
+
+def _portions(system: DelaySystem, omega: FloatArray) -> list[FloatArray]:
+    return np.array_split(omega, 1 + omega.size * system.order**2 // _AT_ONCE)
 
 
 def frequency_grid(
@@ -98,9 +112,8 @@ def frequency_grid(
     if not 0.0 < low < high or not np.isfinite(high):
         raise InputError("low, high", (low, high), "positive, finite and increasing")
     omega = np.geomspace(low, high, 400)
+    sign, size = _log_determinant(system, omega)
     while omega.size < _MAX_POINTS:
-        delta = characteristic.matrix(system, 1j * omega)
-        sign, size = np.linalg.slogdet(delta)
         change = np.abs(np.diff(np.log(sign)).imag) % (2 * np.pi)
         change = np.minimum(change, 2 * np.pi - change) + np.abs(np.diff(size))
         smooth = np.abs(np.diff(np.log(omega))) * system.order
@@ -108,5 +121,18 @@ def frequency_grid(
         coarse = coarse[np.diff(np.log(omega))[coarse] > 1e-5]
         if coarse.size == 0:
             break
-        omega = np.insert(omega, coarse + 1, np.sqrt(omega[coarse] * omega[coarse + 1]))
+        middle = np.sqrt(omega[coarse] * omega[coarse + 1])
+        signs, sizes = _log_determinant(system, middle)
+        omega = np.insert(omega, coarse + 1, middle)
+        sign, size = np.insert(sign, coarse + 1, signs), np.insert(size, coarse + 1, sizes)
     return omega
+
+
+def _log_determinant(system: DelaySystem, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """Return det Δ(iω) by its phase factor and the logarithm of its size."""
+    parts = [
+        np.linalg.slogdet(characteristic.matrix(system, 1j * some))
+        for some in _portions(system, omega)
+    ]
+    sign, size = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return np.asarray(sign, dtype=complex), np.asarray(size)

@@ -33,9 +33,7 @@ def matrix_and_derivative(
     points = points[..., None, None]
     identity = np.eye(system.order)
     delta = points * identity - system.A0
-    slope = np.zeros_like(delta)
-    if with_derivative:
-        slope += identity
+    slope = np.zeros_like(delta) + identity if with_derivative else delta
     for delay, delayed in zip(system.delays, system.delayed, strict=True):
         exponent = -delay * points
         np.minimum(exponent.real, _EXPONENT_LIMIT, out=exponent.real)
