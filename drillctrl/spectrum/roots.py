@@ -42,6 +42,8 @@ _CLOSE = 0.2
 # root that stands alone.
 _WIDE = 0.1
 _NARROW = 1e-3
+# Share of a cluster's spread by which its members may be off before the circle's are taken.
+_ASTRAY = 1e-2
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
@@ -489,6 +491,17 @@ def _change(
     return float((np.abs(1.0 - ratio) * sizes).max())
 
 
+def _from_moments(moments: ComplexArray) -> ComplexArray:
+    """Return numbers by their power sums Σ zʲ, j = 1 … k (Newton's identities)."""
+    size = moments.size
+    coefficients = np.zeros(size + 1, dtype=complex)
+    coefficients[0] = 1.0
+    for j in range(1, size + 1):
+        known = coefficients[:j] @ moments[j - 1 :: -1][:j]
+        coefficients[j] = -known / j
+    return np.asarray(np.roots(coefficients), dtype=complex)
+
+
 def _multiple_root(
     system: DelaySystem, members: ComplexArray, centre: complex, radius: float
 ) -> Root | None:
@@ -519,6 +532,13 @@ def _multiple_root(
     change = _change(system, refined, tight, ratio)
     if change > MULTIPLICITY_TOLERANCE:
         return None
+    if change > ROUNDING_TOLERANCE:
+        # So close together the iteration may come to rest between roots: the circle knows better.
+        exact = centre + _from_moments(np.array([(slope * ring ** (j + 1)).mean() for j in
+                                                 range(1, size + 1)]))  # fmt: skip
+        astray = np.abs(exact[:, None] - members[None, :]).min(axis=1).max()
+        if astray > _ASTRAY * spread:
+            members, spread = exact, float(np.abs(exact - exact.mean()).max())
     outer = _smallest_singular(system, refined + ring)
     weight = float(_weight(system, np.array([refined]))[0])
     rounding = change <= ROUNDING_TOLERANCE

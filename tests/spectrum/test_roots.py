@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -210,3 +211,18 @@ def test_four_roots_near_each_other_are_not_taken_for_one():
     # Counting knows nothing of how roots are found: none right of α, some just left of it.
     assert count_right_of(loop, alpha + 2e-4).count == 0
     assert count_right_of(loop, alpha - 2e-4).count >= 1
+
+
+def test_a_split_fourfold_root_is_found_whatever_rounding_makes_of_it():
+    # Four real roots within 0.07 of each other, which an iteration cannot tell apart.
+    point = OperatingPoint(13.411764705882353, 5.8076923076923075, 14)
+    gains = [-9.93640766, -2.08057287], [7.72228519, 1.49886138]
+    loop = close_loop(plant_system(point), preset_structure("case2"), *gains)
+    counts = [count_right_of(loop, -1.7728024850 + off).count for off in (1e-5, -1e-5)]
+    assert counts == [0, 1]
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        noise = 1.0 + 1e-15 * rng.standard_normal(loop.A0.shape)
+        other = replace(loop, A0=loop.A0 * noise)
+        assert spectral_abscissa(other) == pytest.approx(-1.7728024850, abs=1e-6)
+        assert dominant_roots(other)[0].rightmost == pytest.approx(-1.7728024850, abs=1e-6)
