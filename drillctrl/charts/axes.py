@@ -86,6 +86,8 @@ def make_axis(
     own = tuple(case.plant.own) if case.plant is not None else ()
     groups = tuple(GROUPS) if case.drills else ()
     known = (*groups, *own, *rigs, *gains)
+    if not known:
+        case.physics(f"an axis {name}")
     if not isinstance(name, str) or name not in known:
         raise InputError("axis", str(name), f"one of {', '.join(known)}")
     floor, ceiling, unit, label = -1e6, 1e6, "", gain_label(name)
