@@ -26,8 +26,8 @@ from drillctrl import (
     root_sensitivity,
     simulate,
     spectral_abscissas,
-    stability_volume,
     stabilisable_chart,
+    stability_volume,
     table,
     table1,
 )
