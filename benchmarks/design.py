@@ -30,10 +30,10 @@ def main() -> None:
         for d in (0.02, 0.05) * 6
     ]
     for name in ("p", "case1", "case2"):
-        elapsed = [design(point, name).elapsed_seconds for point in points]
+        elapsed = [design(point, name, trials=False).elapsed_seconds for point in points]
         report(f"design, {name}, median of {len(points)} points", float(np.median(elapsed)), one)
         point = points[0]
-        ours = design(point, name)
+        ours = design(point, name, trials=False)
         family = loop_family(plant_system(point), preset_structure(name))
 
         def collocated(gains: np.ndarray, family: LoopFamily = family) -> float:

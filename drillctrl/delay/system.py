@@ -192,6 +192,11 @@ def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     left = np.zeros((matrix.shape[0], 0))
     if rows.size == 0:
         return left, np.zeros((0, matrix.shape[1]))
+    # Most delayed matrices have rank one, which shows at once.
+    i, j = np.unravel_index(np.argmax(np.abs(matrix)), matrix.shape)
+    column, row = matrix[:, j : j + 1] / matrix[i, j], matrix[i : i + 1]
+    if np.abs(column * row - matrix).max() <= np.finfo(float).eps * abs(matrix[i, j]):
+        return column, row
     _, triangle, order = scipy.linalg.qr(matrix[rows].T, mode="economic", pivoting=True)
     size = np.abs(np.diag(triangle))
     rank = int((size > size[0] * max(matrix.shape) * np.finfo(float).eps).sum())
