@@ -10,16 +10,13 @@ from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import (
-    DIVERGES,
-    SETTLES,
-    TURNS_BACK,
-    UNDECIDED,
     Figures,
     figures,
     grows_without_bound,
 )
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.status import Outcome, Status
 
 # How long a run is: this many times the decay time of the torsional mode's own damping, of
 # which the bit takes half or more away, so that what a start has left is below the swing
@@ -93,7 +90,7 @@ def trial_duration(point: OperatingPoint) -> float:
 def trial_run(case: Case, controller: Controller | None, start: Start) -> Figures:
     """Return what becomes of one start, with control or without."""
     found = figures(_run(case, controller, start, _RTOL))
-    if found.outcome == UNDECIDED:
+    if found.outcome == Outcome.UNDECIDED:
         found = figures(_run(case, controller, start, _FINER))
     return found
 
@@ -109,7 +106,7 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
             rtol=rtol,
             max_steps=most,
         )
-        if run.status != "step limit" or grows_without_bound(run):
+        if run.status != Status.STEP_LIMIT or grows_without_bound(run):
             break
     return run
 
@@ -152,10 +149,10 @@ def _trials(
 ) -> Iterable[Trial]:
     for start in STARTS:
         mine = trial_run(case, controller, start)
-        harm = mine.outcome in (TURNS_BACK, DIVERGES)
+        harm = mine.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES)
         if uncontrolled is not None:
             free = uncontrolled[start.name]
-        elif spare and (harm or mine.outcome == SETTLES):
+        elif spare and (harm or mine.outcome == Outcome.SETTLES):
             free = None
         else:
             free = trial_run(case, None, start)

@@ -11,35 +11,14 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.trials import Trial, trial_runs
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.outcome import (
-    BOUNCES,
-    DIVERGES,
-    LATE,
-    ORBIT,
-    SETTLES,
-    STALLS,
-    STICK_SLIP,
-    TURNS_BACK,
-    UNDECIDED,
-    Figures,
-)
+from drillctrl.simulation.outcome import Figures
+from drillctrl.simulation.status import Outcome
 from drillctrl.simulation.structure import structure_of
 
 # Differences between two runs below which they are alike: irregular motions repeat their
 # figures no better.
 _SWING, _STUCK, _FEED = 0.02, 0.02, 0.05
-_SEVERITY = {LATE: 1, STALLS: 2, TURNS_BACK: 3, DIVERGES: 4}
-_WORDS = {
-    SETTLES: "the motion settles",
-    ORBIT: "the bit goes on swinging",
-    BOUNCES: "the bit bounces",
-    STICK_SLIP: "the bit sticks and slips",
-    LATE: "the bit falls behind the feed",
-    STALLS: "the bit stands still",
-    TURNS_BACK: "the bit turns backwards",
-    DIVERGES: "the motion grows without bound",
-    UNDECIDED: "the run breaks off for a numerical reason and proves nothing",
-}
+_SEVERITY = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
 _STARTS = {
     "small": "a small disturbance",
     "kick": "a kick forward by half the speed",
@@ -131,7 +110,7 @@ def judge(trials: Sequence[Trial], stable: bool) -> Verdict:
         if (harm := _harm(trial)) is not None:
             return Verdict(False, harm, runs)
     good = next((text for trial in runs if (text := _good(trial)) is not None), None)
-    settled = [trial for trial in runs if trial.controlled.outcome == SETTLES]
+    settled = [trial for trial in runs if trial.controlled.outcome == Outcome.SETTLES]
     if not settled and good is None:
         what = "they do not settle it" if stable else "they do not stabilise smooth drilling"
         return Verdict(False, f"{what}, and do no measurable good: {_beside(runs[0])}", runs)
@@ -152,22 +131,24 @@ def _beside(trial: Trial) -> str:
 
 
 def _what(found: Figures) -> str:
-    text = _WORDS[found.outcome]
-    return text if found.swing is None or found.outcome == SETTLES else f"{text} ({_swing(found)})"
+    text = found.outcome.sentence
+    if found.swing is None or found.outcome == Outcome.SETTLES:
+        return text
+    return f"{text} ({_swing(found)})"
 
 
 def _harm(trial: Trial) -> str | None:
     """Say in what the controlled run is worse, if it is."""
     mine, free = trial.controlled, trial.uncontrolled
     ends = _SEVERITY.get(mine.outcome, 0)
-    if mine.outcome in (TURNS_BACK, DIVERGES):
+    if mine.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES):
         return _beside(trial)
     if free is None:
         # Left out where the motion settles: nothing can be better without control.
         return None
     if ends > _SEVERITY.get(free.outcome, 0):
         return _beside(trial)
-    if mine.outcome == UNDECIDED and free.outcome != UNDECIDED:
+    if mine.outcome == Outcome.UNDECIDED and free.outcome != Outcome.UNDECIDED:
         return _beside(trial)
     after = f"after {_STARTS[trial.start]}"
     if _more(mine.swing, free.swing, _SWING):
@@ -183,7 +164,7 @@ def _harm(trial: Trial) -> str | None:
 def _good(trial: Trial) -> str | None:
     """Say in what the controlled run is better, if it is."""
     mine, free = trial.controlled, trial.uncontrolled
-    if free is None or UNDECIDED in (mine.outcome, free.outcome):
+    if free is None or Outcome.UNDECIDED in (mine.outcome, free.outcome):
         return None
     after = f"after {_STARTS[trial.start]}"
     if _SEVERITY.get(mine.outcome, 0) < _SEVERITY.get(free.outcome, 0):

@@ -11,7 +11,8 @@ from drillctrl.designs.loop_analysis import LoopAnalysis
 from drillctrl.designs.worst_case import WorstCase
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.steady import steady_state
-from drillctrl.simulation.outcome import SETTLES, Figures
+from drillctrl.simulation.outcome import Figures
+from drillctrl.simulation.status import Outcome
 from drillctrl.synthesis.objectives import Robust, SemiDiscrete
 
 if TYPE_CHECKING:
@@ -82,8 +83,8 @@ def _trial_lines(result: Analysis) -> Lines:
 
 
 def _figures_text(found: Figures) -> str:
-    text = found.outcome
-    if found.swing is not None and found.outcome != SETTLES:
+    text = str(found.outcome)
+    if found.swing is not None and found.outcome != Outcome.SETTLES:
         text += f", swing {found.swing:.3f}"
     if found.stick_fraction:
         text += f", stick {found.stick_fraction:.1%}"

@@ -16,6 +16,7 @@ from drillctrl.simulation.past import Past
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.status import Status
 from drillctrl.simulation.window import perturbation_of, perturbed, window_of
 
 _RTOL = 1e-11
@@ -141,7 +142,7 @@ def multipliers_at(
             rtol=_RTOL,
             atol=0.1 * _RTOL,
         )
-        if after.status != "done":
+        if after.status != Status.DONE:
             raise InputError("size", size, f"such that a period is not cut short ({after.status})")
         return perturbation_of(after, window, period)
 

@@ -14,6 +14,7 @@ from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.status import Status
 from drillctrl.simulation.summary import section_crossings
 
 # Returns nearer than this many tolerances say nothing of the motion.
@@ -166,7 +167,7 @@ def separation(
         for start in (first, second)
     ]
     for run in runs:
-        if run.status != "done":
+        if run.status != Status.DONE:
             raise InputError("duration", duration, f"before the run ends with {run.status}")
     times = np.linspace(0.5 * duration, duration, 4001)
     names = runs[0].state_names

@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.status import Outcome, Status
 
 if TYPE_CHECKING:
     from drillctrl.simulation.result import Simulation
     from drillctrl.simulation.trace import Motion
-
-SETTLES, ORBIT, STICK_SLIP, BOUNCES = "settles", "orbit", "stick-slip", "bounces"
-LATE, STALLS, TURNS_BACK, DIVERGES = "does-not-keep-up", "stalls", "turns-back", "diverges"
-UNDECIDED = "undecided"
 
 # Rates that stay within this share of their largest range have settled; within the second
 # one too, if they still come together.
@@ -34,7 +31,7 @@ class Figures:
 
     Attributes
     ----------
-    outcome : str
+    outcome : Outcome
         ``"settles"``: steady drilling, reached or nearly so and still nearing;
         ``"orbit"``: a bounded motion, periodic or not, without stick and on the rock;
         ``"bounces"``: the bit leaves the rock; ``"stick-slip"``: it stands still at times;
@@ -53,7 +50,7 @@ class Figures:
         Largest input over the whole run.
     """
 
-    outcome: str
+    outcome: Outcome
     swing: float | None
     stick_fraction: float | None
     feed: float | None
@@ -111,7 +108,7 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
         if not max(sizes) <= _BEYOND * limit:
             return True
         rising = all(a < b for a, b in itertools.pairwise(sizes)) and sizes[-1] > 2.0 * sizes[0]
-        if run.status == "step limit" and rising and sizes[-1] > _LARGE * limit:
+        if run.status == Status.STEP_LIMIT and rising and sizes[-1] > _LARGE * limit:
             return True
     return False
 
@@ -123,26 +120,26 @@ def _quarters(times: FloatArray) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
-def _broken(run: Simulation, motion: Motion) -> str | None:
+def _broken(run: Simulation, motion: Motion) -> Outcome | None:
     """Return what became of a run that says nothing of a lasting motion."""
     if grows_without_bound(run, motion):
-        return DIVERGES
-    if run.status == "reverse rotation":
-        return TURNS_BACK
-    return None if run.status == "done" else UNDECIDED
+        return Outcome.DIVERGES
+    if run.status == Status.REVERSED:
+        return Outcome.TURNS_BACK
+    return None if run.status == Status.DONE else Outcome.UNDECIDED
 
 
-def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> str:
+def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> Outcome:
     """Name a motion that goes on."""
     if stuck > 0.999:
-        return STALLS
+        return Outcome.STALLS
     if fed is not None and fed < _KEEPS_UP:
-        return LATE
+        return Outcome.LATE
     if stuck > 0.0:
-        return STICK_SLIP
+        return Outcome.STICK_SLIP
     if _settles(run, tail):
-        return SETTLES
-    return ORBIT if bool(tail.contact.all()) else BOUNCES
+        return Outcome.SETTLES
+    return Outcome.ORBIT if bool(tail.contact.all()) else Outcome.BOUNCES
 
 
 def _settles(run: Simulation, tail: Motion) -> bool:

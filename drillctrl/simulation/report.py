@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base import units
 from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.status import Status
 
 if TYPE_CHECKING:
     from drillctrl.simulation.floquet import Floquet
@@ -68,6 +69,13 @@ def _resting(run: Simulation) -> bool:
     )
 
 
+def _ended(run: Simulation) -> str:
+    """Say how the run ended, and why if it broke off."""
+    if run.status == Status.DONE:
+        return str(run.status)
+    return f"{run.status} at {run.times[-1]:.6g}: {run.status.sentence}"
+
+
 def _seconds(run: Simulation, time: float) -> str:
     return "" if run.rig is None else f" = {time * run.rig.time_scale:.4g} s"
 
@@ -100,7 +108,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     lines = [
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
         ("Run", f"{run.model} model, {run.duration:g} time units"
-         f"{_seconds(run, run.duration)}, {run.status}"),
+         f"{_seconds(run, run.duration)}, {_ended(run)}"),
         ("Motion", motion),
         ("", ", ".join(kinds) if kinds else "no stick, contact kept"),
     ]  # fmt: skip

@@ -14,6 +14,7 @@ from drillctrl.simulation.kernel import data
 from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, resized, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.status import Status
 from drillctrl.simulation.structure import Structure, structure_of
 
 MODELS = ("nonlinear", "linear")
@@ -182,12 +183,12 @@ def simulate(
     standing = begin(structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1))
     march = kernel("march", structure.physics)
     status = {
-        data.DONE: "done",
-        data.COLLAPSE: "step collapse",
-        data.REVERSED: "reverse rotation",
-        data.TOO_DEEP: "face too old",
-        data.NOT_FINITE: "not finite",
-        data.PAUSED: "time limit",
+        data.DONE: Status.DONE,
+        data.COLLAPSE: Status.COLLAPSE,
+        data.REVERSED: Status.REVERSED,
+        data.TOO_DEEP: Status.TOO_DEEP,
+        data.NOT_FINITE: Status.NOT_FINITE,
+        data.PAUSED: Status.TIME_LIMIT,
     }
     started = time.perf_counter()
     # Few enough that an interrupt is heard soon.
@@ -214,7 +215,7 @@ def simulate(
         duration=duration,
         rtol=rtol,
         atol=atol,
-        status=status.get(outcome, "step limit"),
+        status=status.get(outcome, Status.STEP_LIMIT),
         rejected=int(standing.ints[march.REJECTED]),
         evaluations=int(standing.ints[march.EVALUATIONS]),
         elapsed_seconds=elapsed,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.status import Status
 from drillctrl.simulation.trace import Motion, Trace
 
 SETTLED = 1e-3
@@ -120,7 +121,7 @@ def settling_time(simulation: Trace, within: float = SETTLED_WITHIN) -> float | 
     float or None
         None if the run broke off, or either is still beyond in the last tenth of it.
     """
-    if simulation.status != "done" or simulation.steps == 0:
+    if simulation.status != Status.DONE or simulation.steps == 0:
         return None
     motion = simulation.on_steps(PER_STEP, names=("x", "theta"))
     last = 0.0

@@ -16,6 +16,7 @@ from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.kernel import data
+from drillctrl.simulation.status import Status
 from drillctrl.simulation.structure import Structure
 
 Places = npt.NDArray[np.int64]
@@ -90,9 +91,8 @@ class Trace:
         As given to `simulate`.
     duration : float
         As asked for; ``times[-1]`` is what was reached.
-    status : str
-        ``"done"``, or why it went no further: ``"step collapse"``, ``"reverse rotation"``,
-        ``"step limit"``, ``"time limit"``, ``"face too old"``, ``"not finite"``.
+    status : Status
+        Whether it is done, or why it went no further.
     elapsed_seconds : float
         Wall time of the integration.
     structure : Structure
@@ -109,7 +109,7 @@ class Trace:
     model: str
     cutting: str
     duration: float
-    status: str
+    status: Status
     elapsed_seconds: float
     structure: Structure = field(repr=False)
     settings: data.Settings = field(repr=False)

@@ -16,6 +16,7 @@ from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.status import Status
 from drillctrl.spectrum.roots import spectral_abscissa
 
 OUTCOMES = ("settled", "orbit", "unsettled", "stalled", "reverse rotation", "undecided", "broken")
@@ -155,7 +156,7 @@ def _outcome(trial: Trial, alpha: float, duration: float, size: float) -> tuple[
 
 def outcome_of(run: Simulation, alpha: float) -> str:
     """Return one of `OUTCOMES` for a run, of a linear loop with abscissa α."""
-    if run.status != "done":
+    if run.status != Status.DONE:
         return run.status if run.status in OUTCOMES else "broken"
     summary = run.summary
     if summary.settled:

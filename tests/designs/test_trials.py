@@ -26,6 +26,7 @@ from drillctrl import (
 from drillctrl.designs.trials import STARTS, Trial, trial_duration, uncontrolled_runs
 from drillctrl.designs.verdict import judge
 from drillctrl.simulation.outcome import Figures, figures
+from drillctrl.simulation.status import Outcome
 from drillctrl.tables.grid import Axis, Grid
 
 POINT_C = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)
@@ -201,8 +202,12 @@ def test_stable_but_refused_fails_require_stable(run):
     assert (status, json.loads(out)["stable"], json.loads(out)["recommended"]) == (3, True, False)
 
 
-FINE = Figures("settles", 0.0, 0.0, 1.0, 1.0)
-SWINGS = Figures("orbit", 0.2, 0.0, 1.0, 1.0)
+FINE = Figures(Outcome.SETTLES, 0.0, 0.0, 1.0, 1.0)
+SWINGS = Figures(Outcome.ORBIT, 0.2, 0.0, 1.0, 1.0)
+BROKEN, TURNS, GROWS = (
+    Figures(outcome, None, None, None, 1.0)
+    for outcome in (Outcome.UNDECIDED, Outcome.TURNS_BACK, Outcome.DIVERGES)
+)
 
 
 @pytest.mark.parametrize(
@@ -211,15 +216,14 @@ SWINGS = Figures("orbit", 0.2, 0.0, 1.0, 1.0)
         (FINE, SWINGS, True, True, "from every start"),
         (SWINGS, SWINGS, False, False, "no measurable good"),
         (SWINGS, SWINGS, True, False, "do not settle"),
-        (Figures("orbit", 0.23, 0.0, 1.0, 1.0), SWINGS, False, False, "swings more"),
-        (Figures("orbit", 0.17, 0.0, 1.0, 1.0), SWINGS, False, True, "swings less"),
-        (Figures("stick-slip", 0.2, 0.1, 1.0, 1.0), SWINGS, False, False, "sticks for 10 %"),
-        (Figures("does-not-keep-up", 0.2, 0.0, 0.8, 1.0), SWINGS, False, False, "falls behind"),
-        (Figures("undecided", None, None, None, 1.0), SWINGS, True, False, "numerical reason"),
-        (Figures("stalls", None, 1.0, 0.0, 1.0), SWINGS, True, False, "stands still"),
-        (SWINGS, Figures("stalls", None, 1.0, 0.0, 0.0), False, True, "stands still"),
-        (Figures("turns-back", None, None, None, 1.0), Figures("diverges", None, None, None, 0.0),
-         True, False, "turns backwards"),
+        (Figures(Outcome.ORBIT, 0.23, 0.0, 1.0, 1.0), SWINGS, False, False, "swings more"),
+        (Figures(Outcome.ORBIT, 0.17, 0.0, 1.0, 1.0), SWINGS, False, True, "swings less"),
+        (Figures(Outcome.STICK_SLIP, 0.2, 0.1, 1.0, 1.0), SWINGS, False, False, "sticks for 10 %"),
+        (Figures(Outcome.LATE, 0.2, 0.0, 0.8, 1.0), SWINGS, False, False, "falls behind"),
+        (BROKEN, SWINGS, True, False, "numerical reason"),
+        (Figures(Outcome.STALLS, None, 1.0, 0.0, 1.0), SWINGS, True, False, "stands still"),
+        (SWINGS, Figures(Outcome.STALLS, None, 1.0, 0.0, 0.0), False, True, "stands still"),
+        (TURNS, GROWS, True, False, "turns backwards"),
     ],
 )  # fmt: skip
 def test_judgement(mine, free, stable, recommended, words):
@@ -229,7 +233,7 @@ def test_judgement(mine, free, stable, recommended, words):
 
 
 def test_small_basin_is_said():
-    lost = Figures("stick-slip", 1.0, 0.1, 1.0, 1.0)
+    lost = Figures(Outcome.STICK_SLIP, 1.0, 0.1, 1.0, 1.0)
     verdict = judge([Trial("small", FINE, lost), Trial("kick", lost, lost)], True)
     assert verdict.recommended is True
     assert "not from every start" in verdict.reason

@@ -1,0 +1,47 @@
+"""How a run ended, and what became of the motion: each a word with a sentence."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class _Told(StrEnum):
+    """Words that carry a sentence for people."""
+
+    sentence: str
+
+    def __new__(cls, word: str, sentence: str) -> _Told:
+        """Make a word that is told by a sentence."""
+        member = str.__new__(cls, word)
+        member._value_ = word
+        member.sentence = sentence
+        return member
+
+
+class Status(_Told):
+    """How a run ended."""
+
+    DONE = "done", "the run lasted as long as was asked"
+    REVERSED = "reverse rotation", "the bit turned backwards, for which the model has no face"
+    STEP_LIMIT = "step limit", "the steps that were permitted are used up"
+    TIME_LIMIT = "time limit", "the wall time that was permitted is used up"
+    COLLAPSE = "step collapse", "no step is short enough for the error that was asked"
+    TOO_DEEP = "face too old", "what the bit would meet was cut before all that is kept"
+    NOT_FINITE = "not finite", "the motion left the numbers that a computer has"
+
+
+class Outcome(_Told):
+    """What became of a motion; all but the last three by its last quarter."""
+
+    SETTLES = "settles", "the motion settles"
+    ORBIT = "orbit", "the bit goes on swinging"
+    BOUNCES = "bounces", "the bit bounces"
+    STICK_SLIP = "stick-slip", "the bit sticks and slips"
+    LATE = "does-not-keep-up", "the bit falls behind the feed"
+    STALLS = "stalls", "the bit stands still"
+    TURNS_BACK = "turns-back", "the bit turns backwards"
+    DIVERGES = "diverges", "the motion grows without bound"
+    UNDECIDED = (
+        "undecided",
+        "the run breaks off for a numerical reason and proves nothing",
+    )
