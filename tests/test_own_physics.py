@@ -126,3 +126,24 @@ def test_gains_are_tried_on_the_plant_that_they_are_for():
     assert tried.recommended is not None
     fresh = analyze(as_case(POINT, plant), structure, tried.K1, tried.K2, trials=True)
     assert fresh.trials == tried.trials
+
+
+def test_a_parameter_of_the_law_is_an_axis_of_a_table(tmp_path):
+    plant, structure = PLANTS["velocity-weakening law"]
+    grid = dimensionless_grid(
+        10.0, 2.5, 14.0, as_case(POINT, plant), parameter=linear_axis("drop", 0.5, 2.0, 3)
+    )
+    made = table(grid, structure, trials=False)
+    assert made.columns[:3] == ("omega0", "delta0", "drop")
+    for value, gains in zip((0.5, 1.25, 2.0), made.gains, strict=True):
+        there = as_case(POINT, paper_plant(bit=VelocityWeakening(drop=value)))
+        alone = design(there, structure, trials=False)
+        loop = close_loop(there.system(("torque",)), alone.structure, *made.structure.gains(gains))
+        assert count_right_of(loop, alone.spectral_abscissa + 1e-3).count == 0
+    path = tmp_path / "gains.csv"
+    save_table(made, path)
+    again = load_table(path, plant=plant)
+    assert again.gains_at(10.0, 2.5, 1.25)[0] == pytest.approx(made.gains_at(10.0, 2.5, 1.25)[0])
+    assert "drop" in export_c(made, tmp_path, "drill", period=0.02, limit=3.0)[0].read_text()
+    with pytest.raises(InputError, match="axes"):
+        dimensionless_grid(10.0, 2.5, parameter=linear_axis("drop", 0.5, 2.0, 3))

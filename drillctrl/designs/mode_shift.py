@@ -142,9 +142,10 @@ def _followed(
 def _newton(system: DelaySystem, s: complex) -> complex | None:
     change = np.inf
     for _ in range(_NEWTON):
-        move = 1.0 / characteristic.log_derivative_at(system, s)
-        if not np.isfinite(move):
+        slope = characteristic.log_derivative_at(system, s)
+        if slope == 0.0 or np.isnan(slope):
             return None
+        move = 1.0 / slope
         s -= move
         change = abs(move) / (1.0 + abs(s))
         if change < _SMALL:

@@ -73,7 +73,7 @@ class Campaign:
         """Names of the entries of a row."""
         sizes = [f"{size:g}" for size in self.sizes]
         return (
-            *("omega0", "delta0", "psi", "spectral_abscissa", "duration"),
+            *(*self.grid.names, "spectral_abscissa", "duration"),
             *(f"outcome_{size}" for size in sizes),
             *(f"settling_time_{size}" for size in sizes),
             *("settles_up_to", "first_unsettled"),
@@ -82,11 +82,11 @@ class Campaign:
     def rows(self) -> list[list[float | str | None]]:
         """Return one row an operating point in the order of `columns`; None for no number."""
         rows: list[list[float | str | None]] = []
-        for i, point in enumerate(self.grid.points):
+        for i, groups in enumerate(self.grid.groups(self.grid.coordinates).tolist()):
             numbers = [*self.settling_times[i].tolist(), *self.basin[i].tolist()]
             rows.append(
                 [
-                    *(point.omega0, point.delta0, point.psi),
+                    *groups,
                     *(float(self.spectral_abscissa[i]), float(self.durations[i])),
                     *self.outcomes[i].tolist(),
                     *(None if np.isnan(value) else value for value in numbers),
@@ -316,6 +316,5 @@ def _controller_at(controller: Controller | GainTable | None, case: Case) -> Con
     """Return what closes the loop at an operating point."""
     if not isinstance(controller, GainTable):
         return controller
-    _, point = case.physics("a campaign")
-    K1, K2 = controller.gains_at(point.omega0, point.delta0, point.psi)
+    K1, K2 = controller.gains_at(*(case.parameters[name] for name in controller.grid.names))
     return Controller(controller.structure, K1[0], K2[0], plant=controller.grid.plant)

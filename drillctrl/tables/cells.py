@@ -140,7 +140,7 @@ def _abscissas(
         own = cells.mode[index] == CONSTANT
         vectors[own] = cells.gains[index[own]]
     groups = grid.groups(coordinates)
-    parameters = dict(zip(("omega0", "delta0", "psi"), groups.T, strict=True))
+    parameters = dict(zip(grid.names, groups.T, strict=True))
     first = grid.case(*(axis.values[0] for axis in grid.axes))
     return spectral_abscissas(first, parameters, structure, vectors)
 

@@ -196,10 +196,10 @@ def _restarts(
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
     gains = np.array([found[i].gains for i in range(len(grid.points))])
     own = np.array([found[i].spectral_abscissa for i in range(len(grid.points))])
-    groups = np.array([[p.omega0, p.delta0, p.psi] for p in grid.points])[pairs[:, 0]]
+    groups = grid.groups(grid.coordinates)[pairs[:, 0]]
     borrowed = spectral_abscissas(
         grid.cases[0],
-        {"omega0": groups[:, 0], "delta0": groups[:, 1], "psi": groups[:, 2]},
+        dict(zip(grid.names, groups.T, strict=True)),
         structure,
         gains[pairs[:, 1]],
     )

@@ -49,7 +49,7 @@ class Axis:
     Attributes
     ----------
     name : str
-        A key of `AXIS_UNITS`.
+        A key of `AXIS_UNITS`, or a parameter of the plant's parts.
     values : tuple of float
         In its SI unit; at least one.
 
@@ -63,8 +63,9 @@ class Axis:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if self.name not in AXIS_UNITS:
-            raise InputError("axis", self.name, f"one of {', '.join(AXIS_UNITS)}")
+        if not (isinstance(self.name, str) and self.name.isidentifier()):
+            known = ", ".join(AXIS_UNITS)
+            raise InputError("axis", self.name, f"one of {known}, or a parameter of the plant")
         values = tuple(checked_number(self.name, value) for value in self.values)
         if not values or any(b <= a for a, b in itertools.pairwise(values)):
             raise InputError(self.name, list(values)[:4], "at least one value, rising")
@@ -73,7 +74,7 @@ class Axis:
     @property
     def unit(self) -> str:
         """SI unit, ``"1"`` for a plain number."""
-        return AXIS_UNITS[self.name]
+        return AXIS_UNITS.get(self.name, "1")
 
     @property
     def field_unit(self) -> tuple[str, float]:
@@ -105,8 +106,8 @@ class Grid:
     Attributes
     ----------
     axes : tuple of three Axis
-        Named as `DIMENSIONLESS`, `RATE` or `WEIGHT`, in that order. The last varies
-        fastest among the nodes.
+        Named as `DIMENSIONLESS`, `RATE` or `WEIGHT`, in that order; a parameter of the plant's
+        parts may take the place of ψ. The last varies fastest among the nodes.
     reference : OperatingPoint or Rig
         What does not vary: η, ξ, κ and n of a dimensionless grid, the rig of the others.
     plant : Plant
@@ -127,7 +128,9 @@ class Grid:
             parts = {} if self.rig is None else self.rig.hardware()
             object.__setattr__(self, "plant", paper_plant(**parts))
         names = tuple(axis.name for axis in self.axes)
-        fitting = (DIMENSIONLESS,) if self.rig is None else (RATE, WEIGHT)
+        fitting: tuple[tuple[str, ...], ...] = (RATE, WEIGHT)
+        if self.rig is None:
+            fitting = tuple((*DIMENSIONLESS[:2], third) for third in ("psi", *self.plant.own))
         if names not in fitting:
             wanted = " or ".join(", ".join(choice) for choice in fitting)
             raise InputError("axes", ", ".join(names), wanted)
@@ -138,6 +141,12 @@ class Grid:
     def rig(self) -> Rig | None:
         """The rig, of a grid in rig units."""
         return self.reference if isinstance(self.reference, Rig) else None
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """Parameters of the case that the three axes stand for."""
+        third = "psi" if self.rig is not None else self.axes[2].name
+        return ("omega0", "delta0", third)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -159,16 +168,20 @@ class Grid:
     @functools.cached_property
     def cases(self) -> tuple[Case, ...]:
         """What drills at all nodes."""
-        return tuple(Case(self.plant, point) for point in self.points)
+        return tuple(self.case(*row) for row in self.coordinates.tolist())
 
     def case(self, speed: float, feed: float, rock: float) -> Case:
         """Return what drills at coordinates on the three axes."""
-        return Case(self.plant, self.point(speed, feed, rock))
+        third, plant = self.names[2], self.plant
+        if third != "psi":
+            plant = plant.with_values(**{third: rock})
+        return Case(plant, self.point(speed, feed, rock))
 
     def point(self, speed: float, feed: float, rock: float) -> OperatingPoint:
         """Return the operating point at coordinates on the three axes."""
         if isinstance(self.reference, OperatingPoint):
-            return self.reference.with_changes(omega0=speed, delta0=feed, psi=rock)
+            rocks = {"psi": rock} if self.names[2] == "psi" else {}
+            return self.reference.with_changes(omega0=speed, delta0=feed, **rocks)
         return self._rig_point(self.reference, speed, feed, rock).operating_point()
 
     def _rig_point(self, rig: Rig, speed: float, feed: float, rock: float) -> RigPoint:
@@ -178,7 +191,7 @@ class Grid:
         return RigPoint(placed, speed, feed)
 
     def groups(self, coordinates: npt.ArrayLike) -> FloatArray:
-        """Return ω0, δ0 and ψ at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
+        """Return `names` at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
         places = np.atleast_2d(np.asarray(coordinates, dtype=float))
         if self.rig is None:
             return places
@@ -188,7 +201,7 @@ class Grid:
     def locate(
         self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
     ) -> FloatArray:
-        """Return coordinates on the axes of operating points, (q,) each → (q, 3)."""
+        """Return coordinates on the axes of values of `names`, (q,) each → (q, 3)."""
         arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in
                                        (omega0, delta0, psi)))  # fmt: skip
         groups = np.column_stack([array.ravel() for array in arrays])
@@ -211,6 +224,8 @@ def dimensionless_grid(
     delta0: Axis | float,
     psi: Axis | float = 14.0,
     reference: OperatingPoint | Case | None = None,
+    *,
+    parameter: Axis | None = None,
 ) -> Grid:
     """Return a grid over dimensionless groups.
 
@@ -221,6 +236,13 @@ def dimensionless_grid(
     reference : OperatingPoint or Case, optional
         Supplies the other groups and the plant; by default those of `OperatingPoint`, and the
         paper's.
+    parameter : Axis, optional
+        Over a parameter of the plant's parts; ψ is then a number.
+
+    Raises
+    ------
+    InputError
+        If an axis is none of the plant's, or ψ is to vary beside another parameter.
     """
     case = None if reference is None else as_case(reference)
     plant = None if case is None else case.physics("a grid")[0]
@@ -233,7 +255,12 @@ def dimensionless_grid(
     )
     # The node-dependent groups of the reference say nothing; one grid has one reference.
     here = replace(here.with_changes(psi=first[2]), omega0=first[0], delta0=first[1])
-    return Grid((axes[0], axes[1], axes[2]), here, plant or paper_plant())
+    third = axes[2]
+    if parameter is not None:
+        if len(third.values) > 1:
+            raise InputError("psi", list(third.values)[:4], f"a number beside {parameter.name}")
+        third = parameter
+    return Grid((axes[0], axes[1], third), here, plant or paper_plant())
 
 
 def rig_grid(

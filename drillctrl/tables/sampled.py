@@ -13,7 +13,7 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.tables.document import plain_values, to_document
-from drillctrl.tables.grid import DIMENSIONLESS, Grid
+from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
 from drillctrl.tables.table import GainTable
 
@@ -146,7 +146,7 @@ def sampled_controller(
     bounds = zip(structure.entry_names, structure.flat_lower, structure.flat_upper, strict=True)
     groups = plain_values(table.grid.reference)
     # Those that vary over the grid are axes, and λ does with ψ.
-    varying = (*DIMENSIONLESS, "lam", "rock_strength")
+    varying = (*grid.names, "lam", "rock_strength")
     given = {k: v for k, v in groups.items() if k not in varying}
     text = ", ".join(f"{k} {v:g}" for k, v in given.items())
     law = "u = K1 Y(t) + K2 Y(t - delay)"

@@ -87,6 +87,10 @@ def scheduled(
             times[-1:] = [change.time]
     instants = np.array([0.0, *times])
     places = course(point, scenario, instants + 2e-9)
+    third = table.grid.names[2]
+    if third != "psi":
+        # Nothing in a scenario changes the plant.
+        places[:, 2] = table.grid.plant.own[third]
     K1, K2 = table.gains_at(*places.T)
     fixed = options.get("delay", "fixed") == "fixed"
     entries = tuple(

@@ -57,7 +57,7 @@ def smooth_gains(
     pairs = pairs[movable[pairs].all(axis=1)]
     if not len(pairs) or give_up <= 0.0:
         return gains
-    groups = np.array([[p.omega0, p.delta0, p.psi] for p in grid.points])
+    groups = grid.groups(grid.coordinates)
     width = structure.upper - structure.lower
     colour = sum(np.unravel_index(np.arange(len(best)), grid.shape)) % 2
     beside: list[list[int]] = [[] for _ in best]
@@ -93,7 +93,7 @@ def smooth_gains(
             if not rows:
                 continue
             index, vectors = np.array(rows), np.array(trials)
-            parameters = dict(zip(("omega0", "delta0", "psi"), groups[index].T, strict=True))
+            parameters = dict(zip(grid.names, groups[index].T, strict=True))
             alpha = spectral_abscissas(grid.points[0], parameters, structure, vectors)
             good = np.flatnonzero(alpha <= limit[index])
             # Trials of a node stand in the order of what they bring; the first good one is taken.

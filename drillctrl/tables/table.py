@@ -129,7 +129,8 @@ class GainTable:
         Parameters
         ----------
         omega0, delta0, psi : array_like, (q,)
-            Dimensionless groups; numbers are repeated.
+            Dimensionless groups, or what stands for ψ among the grid's names; numbers are
+            repeated.
 
         Returns
         -------
@@ -186,16 +187,16 @@ class GainTable:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the first columns of a row, the same in every file."""
-        names = ("omega0", "delta0", "psi", *self.structure.entry_names)
+        names = (*self.grid.names, *self.structure.entry_names)
         known = ("spectral_abscissa", "stable", "certified", "best_abscissa", ABSCISSA_ERROR)
         return (*names, *known, "refused")
 
     def rows(self) -> list[list[float | bool]]:
         """Return one row a node in the order of `columns`."""
         return [
-            [point.omega0, point.delta0, point.psi, *gains, *rest]
-            for point, gains, *rest in zip(
-                self.grid.points,
+            [*groups, *gains, *rest]
+            for groups, gains, *rest in zip(
+                self.grid.groups(self.grid.coordinates).tolist(),
                 self.entries.tolist(),
                 self.spectral_abscissa.tolist(),
                 self.stable.tolist(),
