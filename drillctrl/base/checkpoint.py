@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.files import replacing
+from drillctrl.base.files import check_regular, replacing
 
+_MOST_BYTES = 4_000_000_000
 _LIBRARIES = ("casadi", "numba", "numpy", "scipy")
 # What no result in a checkpoint comes from.
 _ASIDE = ("charts", "cli", "interop", "paper")
@@ -44,6 +45,8 @@ class Checkpoint:
         self._used: set[str] = set()
         header = _header()
         try:
+            if self._path.exists():
+                check_regular(self._path, _MOST_BYTES)
             self._file = self._path.open("a+b")
             self._file.seek(0)
             first = self._file.readline()

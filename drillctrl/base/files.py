@@ -1,13 +1,27 @@
-"""Write files whole or not at all."""
+"""Read regular files only, and write files whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
+
+
+def check_regular(path: str | Path, limit: int) -> None:
+    """Raise `OSError` unless a path leads to a regular file of at most ``limit`` bytes.
+
+    Devices and pipes may never end.
+    """
+    found = os.stat(path)
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "not a regular file")
+    if found.st_size > limit:
+        raise OSError(errno.EFBIG, f"larger than {limit / 1e6:g} MB")
 
 
 @contextlib.contextmanager

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import sys
+from typing import TextIO
 
 import click
 
@@ -43,6 +45,8 @@ for _command in (
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its status."""
+    for stream in (sys.stdout, sys.stderr):
+        _make_writable(stream)
     try:
         status = cli.main(arguments, prog_name="drillctrl", standalone_mode=False)
         sys.stdout.flush()
@@ -62,6 +66,23 @@ def main(arguments: list[str] | None = None) -> None:
             _fail(f"standard output = {error.strerror}: must be something that can be written to")
         sys.exit(1)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _make_writable(stream: TextIO) -> None:
+    """Let a stream take every character, whatever encoding it was opened with.
+
+    A file or a pipe gets UTF-8 where its own encoding has no Greek; a terminal of that kind shows
+    escapes, for another encoding would be garbled.
+    """
+    if not isinstance(stream, io.TextIOWrapper):
+        return
+    try:
+        "αω → ·²".encode(stream.encoding)
+    except (UnicodeEncodeError, LookupError):
+        if stream.isatty():
+            stream.reconfigure(errors="backslashreplace")
+        else:
+            stream.reconfigure(encoding="utf-8")
 
 
 def _fail(message: str) -> None:

@@ -12,11 +12,12 @@ from typing import Any
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.base.files import write_text
+from drillctrl.base.files import check_regular, write_text
 from drillctrl.base.units import Dimension
 
 STANDARD_GRAVITY = 9.80665
 PRESETS = ("table1",)
+_MOST_BYTES = 1_000_000
 
 
 def _parameter(dimension: Dimension, *, zero: bool = False) -> Any:
@@ -173,12 +174,14 @@ def load_rig(source: str | Path) -> Rig:
     path = Path(source)
     permitted = f"one of the presets {', '.join(PRESETS)} or a readable TOML file"
     try:
+        check_regular(path, _MOST_BYTES)
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
         raise InputError("rig", str(source), f"{permitted} ({reason})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError("rig", str(source), f"a valid TOML file ({error})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        why = "nested too deep" if isinstance(error, RecursionError) else str(error)
+        raise InputError("rig", str(source), f"a valid TOML file ({why})") from None
     return _rig_from_mapping(data, str(source))
 
 

@@ -96,7 +96,8 @@ class Climb:
             step[lost] = 0.0
             size = np.abs(step)
             stalled = (size >= last[rest]) & (size < 1e-6 * scale)
-            step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
+            with np.errstate(over="ignore", invalid="ignore"):
+                step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
             step[stalled] = 0.0
             s[rest] = s[rest] - step
             last[rest] = np.where(stalled, last[rest], size)

@@ -136,7 +136,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> _Polished:
         stalled = (size >= last) & (size < 1e-3 * scale)
         step[stalled] = 0.0
         if (size > 0.3 * scale).any():
-            step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
+            with np.errstate(over="ignore", invalid="ignore"):
+                step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
         s = s - step
         s.imag = np.abs(s.imag)
         last = size

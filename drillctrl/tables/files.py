@@ -14,7 +14,7 @@ import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
-from drillctrl.base.files import replacing
+from drillctrl.base.files import check_regular, replacing
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
@@ -75,8 +75,7 @@ def load_table(path: str | Path, plant: Plant | None = None) -> GainTable:
     check_table_path(path)
     source = Path(path)
     try:
-        if source.stat().st_size > MAX_BYTES:
-            raise ValueError("a file of more than 1 GB")
+        check_regular(source, MAX_BYTES)
         document = _FORMATS[source.suffix.lower()][1](source)
         return from_document(document, paper_plant() if plant is None else plant)
     except OSError as error:
