@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
+import warnings
 from typing import TextIO
 
 import click
@@ -48,7 +49,10 @@ def main(arguments: list[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         _make_writable(stream)
     try:
-        status = cli.main(arguments, prog_name="drillctrl", standalone_mode=False)
+        with warnings.catch_warnings():
+            # NumPy remarks on overflow; whether a number can be believed is told otherwise.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            status = cli.main(arguments, prog_name="drillctrl", standalone_mode=False)
         sys.stdout.flush()
     except InputError as error:
         _fail(str(error))
