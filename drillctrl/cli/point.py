@@ -11,6 +11,7 @@ from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.drilling.point import OperatingPoint, RigPoint
+    from drillctrl.drilling.rig import Rig
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -43,7 +44,10 @@ def point_options(command: Command) -> Command:
         click.option("--blades", type=float, help="Number of blades n (default 4)."),
         click.option("--lam", type=float, help="Wear-flat force λ (default 0.7461 ψ)."),
         click.option("--beta", type=float, help="Wear-flat torque β (default 0.2686)."),
-        click.option("--rig", help="Preset (table1) or TOML file, instead of the above."),
+        click.option(
+            "--rig",
+            help="table1, paper-string, vertical-3000, deep-5000, or a TOML file.",
+        ),
         click.option("--speed", help="Rotary speed with its unit, such as '120 rpm'."),
         click.option("--rop", help="Rate of penetration with its unit, such as '20 m/h'."),
         click.option("--wob", help="Weight on bit instead of --rop, such as '20 kN'."),
@@ -87,10 +91,23 @@ def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
     return OperatingPoint(**values)
 
 
+def read_rig(source: str) -> Rig:
+    """Return a rig, with a real string or without, by its preset or from a file.
+
+    Raises
+    ------
+    InputError
+        If there is no such preset or file, or the file holds no rig.
+    """
+    from drillctrl.drilling.rig import load_rig
+    from drillctrl.strings.presets import PRESETS, string_preset
+
+    return string_preset(source) if source in PRESETS else load_rig(source)
+
+
 def _rig_point(given: dict[str, Any]) -> RigPoint:
     from drillctrl.base import units
     from drillctrl.drilling.point import RigPoint
-    from drillctrl.drilling.rig import load_rig
     from drillctrl.drilling.steady import rig_point_at_weight_on_bit
 
     for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
@@ -99,7 +116,7 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     if ("rop" in given) == ("wob" in given):
         shown = given.get("rop", "(missing)")
         raise InputError("--rop", shown, "given, such as '20 m/h', or else --wob, one of the two")
-    rig = load_rig(given["rig"])
+    rig = read_rig(given["rig"])
     if "rock_strength" in given:
         strength = units.to_si("--rock-strength", given["rock_strength"], units.STRESS)
         rig = rig.with_rock_strength(strength)
