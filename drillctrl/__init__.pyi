@@ -51,7 +51,6 @@ from .drilling.plant import top_drive_plant as top_drive_plant
 from .drilling.point import OperatingPoint as OperatingPoint
 from .drilling.point import RigPoint as RigPoint
 from .drilling.rig import Rig as Rig
-from .drilling.rig import load_rig as load_rig
 from .drilling.rig import save_rig as save_rig
 from .drilling.rig import table1 as table1
 from .drilling.sensors import Filtered as Filtered
@@ -107,6 +106,8 @@ from .strings.drill_string import Damping as Damping
 from .strings.drill_string import DrillString as DrillString
 from .strings.exact import ExactLoop as ExactLoop
 from .strings.exact import exact_loop as exact_loop
+from .strings.files import load_rig as load_rig
+from .strings.files import read_tally as read_tally
 from .strings.model import PipeString as PipeString
 from .strings.presets import string_preset as string_preset
 from .strings.rig import StringRig as StringRig

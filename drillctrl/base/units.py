@@ -57,6 +57,8 @@ TORSIONAL_DAMPING = Dimension(
     "a torsional damping", "N*m*s/rad", "'32.9 N*m*s/rad' or '24.3 ft*lbf*s/rad'"
 )
 NUMBER = Dimension("a plain number", "", "'0.6'")
+DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
+LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")
 TIME = Dimension("a time", "s", "'0.35 s' or '20 ms'")
 
 # The field's spellings that pint lacks or reads as something else (kNm: nautical miles).
@@ -67,6 +69,7 @@ _DEFINITIONS = (
     "RPM = revolution / minute",
     "rev = revolution",
     "hr = hour",
+    "ppg = pound / gallon",
 )
 
 

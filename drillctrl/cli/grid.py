@@ -79,7 +79,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
 
 def _rig_grid(given: dict[str, str]) -> Grid:
     from drillctrl.base import units
-    from drillctrl.cli.point import read_rig
+    from drillctrl.strings.files import load_rig
     from drillctrl.tables.grid import rig_grid
 
     for name in ("rig", "speed"):
@@ -100,7 +100,7 @@ def _rig_grid(given: dict[str, str]) -> Grid:
         if option in given
     }
     speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
-    return rig_grid(read_rig(given["rig"]), speed, **axes)
+    return rig_grid(load_rig(given["rig"]), speed, **axes)
 
 
 def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:

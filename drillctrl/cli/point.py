@@ -11,7 +11,6 @@ from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.drilling.point import OperatingPoint, RigPoint
-    from drillctrl.drilling.rig import Rig
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -91,24 +90,11 @@ def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
     return OperatingPoint(**values)
 
 
-def read_rig(source: str) -> Rig:
-    """Return a rig, with a real string or without, by its preset or from a file.
-
-    Raises
-    ------
-    InputError
-        If there is no such preset or file, or the file holds no rig.
-    """
-    from drillctrl.drilling.rig import load_rig
-    from drillctrl.strings.presets import PRESETS, string_preset
-
-    return string_preset(source) if source in PRESETS else load_rig(source)
-
-
 def _rig_point(given: dict[str, Any]) -> RigPoint:
     from drillctrl.base import units
     from drillctrl.drilling.point import RigPoint
     from drillctrl.drilling.steady import rig_point_at_weight_on_bit
+    from drillctrl.strings.files import load_rig
 
     for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
         if name not in given:
@@ -116,7 +102,7 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     if ("rop" in given) == ("wob" in given):
         shown = given.get("rop", "(missing)")
         raise InputError("--rop", shown, "given, such as '20 m/h', or else --wob, one of the two")
-    rig = read_rig(given["rig"])
+    rig = load_rig(given["rig"])
     if "rock_strength" in given:
         strength = units.to_si("--rock-strength", given["rock_strength"], units.STRESS)
         rig = rig.with_rock_strength(strength)

@@ -153,39 +153,34 @@ def table1() -> Rig:
     )
 
 
-def load_rig(source: str | Path) -> Rig:
-    """Load a preset by name or a rig from a TOML file.
-
-    Parameters
-    ----------
-    source : str or Path
-        ``"table1"``, or the path of a file that holds the attributes of `Rig` as keys,
-        each a text with a unit (``mass = "34 t"``), plain numbers for the dimensionless
-        ones. Only ``blades`` may be left out.
+def read_toml(source: str | Path, permitted: str) -> dict[str, Any]:
+    """Return what a TOML file holds.
 
     Raises
     ------
     InputError
-        If there is no such preset or file, or the file is not TOML, lacks a key, has one
-        too many, or holds a value outside its range.
+        If there is no such file, or it is not TOML; the message says what is permitted.
     """
-    if str(source) in PRESETS:
-        return table1()
     path = Path(source)
-    permitted = f"one of the presets {', '.join(PRESETS)} or a readable TOML file"
     try:
         check_regular(path, _MOST_BYTES)
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
         raise InputError("rig", str(source), f"{permitted} ({reason})") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         why = "nested too deep" if isinstance(error, RecursionError) else str(error)
         raise InputError("rig", str(source), f"a valid TOML file ({why})") from None
-    return _rig_from_mapping(data, str(source))
 
 
-def _rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
+def rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
+    """Return a rig of lumped numbers from texts with units, by the names of its attributes.
+
+    Raises
+    ------
+    InputError
+        If a key is missing or unknown, or a value is outside its range.
+    """
     known = {item.name: item for item in fields(Rig)}
     for key in data:
         if key not in known:
@@ -206,7 +201,7 @@ def _rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
 
 
 def save_rig(rig: Rig, path: str | Path) -> None:
-    """Write a rig to a TOML file that `load_rig` reads back without loss.
+    """Write a rig of lumped numbers to a TOML file that `load_rig` reads back without loss.
 
     Raises
     ------

@@ -1,0 +1,123 @@
+"""Rig files that hold a string, and what they are refused for."""
+
+import pytest
+
+from drillctrl import InputError, load_rig, read_tally, string_preset
+
+BIT = """
+[bit]
+diameter = "8.5 in"
+blades = 4
+wearflat_length = "1.2 mm"
+cutter_inclination = 0.6
+friction_coefficient = 0.6
+bit_geometry = 1.0
+
+[rock]
+strength = "60 MPa"
+contact_strength = "60 MPa"
+"""
+STRING = """
+[string]
+mud_density = "10 ppg"
+torsional_damping = 0.2
+
+[[string.section]]
+name = "upper pipe"
+pipe = '5" 19.5#'
+joints = 200
+
+[[string.section]]
+type = "collar"
+length = "500 ft"
+OD = "8 in"
+ID = "2 13/16 in"
+"""
+TALLY = """\
+name,type,joints,length [ft],OD [in],ID [in],tool joint OD [in],tool joint ID [in],\
+tool joint length,weight,material
+pipe,DP,100,3150,5,4.276,6.625,3.75,0.55 m,31 kg/m,steel
+collars,DC,,600,8,2.8125,,,,,
+"""
+
+
+def written(folder, text, name="rig.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_sections_in_the_file(tmp_path):
+    text = BIT + STRING.replace("2 13/16 in", "2.8125 in")
+    rig = load_rig(written(tmp_path, text))
+    upper, collars = rig.string.sections
+    assert upper.length == pytest.approx(200 * 9.6)
+    assert upper.kind == "pipe"
+    assert collars.length == pytest.approx(152.4)
+    assert collars.outer_diameter == pytest.approx(0.2032)
+    assert rig.string.mud_density == pytest.approx(1198.26, abs=0.01)
+    assert rig.string.damping.torsional == 0.2
+    assert rig.bit_radius == pytest.approx(0.10795)
+    assert rig.drive_inertia is None
+    driven = load_rig(written(tmp_path, text + '[top_drive]\ninertia = "2900 kg*m^2"\n'))
+    assert driven.drive_inertia == 2900.0
+
+
+def test_a_tally_beside_the_file(tmp_path):
+    written(tmp_path, TALLY, "tally.csv")
+    rig = load_rig(written(tmp_path, BIT + '[string]\ntally = "tally.csv"\n'))
+    pipe, collars = rig.string.sections
+    assert pipe.length == pytest.approx(3150 * 0.3048)
+    assert pipe.joints == 100
+    assert pipe.tool_joint.length == 0.55
+    assert pipe.mass_per_metre == pytest.approx(31.0)
+    assert collars.tool_joint is None
+    assert read_tally(tmp_path / "tally.csv") == rig.string.sections
+
+
+def test_presets_are_rigs_too():
+    assert load_rig("paper-string") == string_preset("paper-string")
+    assert load_rig("table1").mass == 3.4e4
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("500 ft", "-500 ft"), "length of collar"),
+        (("OD =", "OOD ="), "key in section 2"),
+        (('ID = "2.8125 in"', 'ID = "9 in"'), "ID of collar = 228.6 mm"),
+        (("500 ft", "500 kg"), "length in section 2"),
+        (("8.5 in", "85 in"), "bit.diameter"),
+        (("joints = 200", "joints = 2.5"), "joints in section 1"),
+        (('5" 19.5#', '5" 19.6#'), "pipe = "),
+        (('type = "collar"', 'type = "color"'), "type in section 2"),
+        (("[rock]", "[stone]"), "key in"),
+        (('strength = "60 MPa"\ncontact', "contact"), "strength in"),
+        (("[[string.section]]", "[[string.sections]]"), "sections"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, change, message):
+    text = (BIT + STRING).replace("2 13/16 in", "2.8125 in")
+    assert change[0] in text
+    with pytest.raises(InputError) as caught:
+        load_rig(written(tmp_path, text.replace(*change)))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "at least one section"),
+        (TALLY.splitlines()[0], "at least one section"),
+        (TALLY.replace("OD [in]", "outside [in]", 1), "column of"),
+        (TALLY.replace(",DC,,600", ",DC,600"), "cells"),
+        (TALLY.replace("length [ft]", "length", 1), "length in row 2"),
+        (TALLY.replace("31 kg/m", "31 kg"), "weight in row 2"),
+        (TALLY.replace(",3.75,", ",,"), "tool_joint_id in row 2"),
+    ],
+)
+def test_a_wrong_tally_is_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match="must be") as caught:
+        read_tally(written(tmp_path, text, "tally.csv"))
+    assert message in str(caught.value)
