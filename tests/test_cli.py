@@ -362,3 +362,25 @@ def test_a_missing_extra_is_one_line(capsys, tmp_path, monkeypatch, arguments, p
     wanted = f"{package} = missing: must be installed: pip install 'drillctrl[{extra}]'"
     assert err == f"drillctrl: {wanted}\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_axes_of_a_chart_need_no_value_beside_them(capsys):
+    axes = ("--x", "speed=100:300 rpm", "--y", "rop=1:60 m/h")
+    areas = []
+    for beside in ((), ("--speed", "120 rpm", "--rop", "20 m/h")):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(["chart", "--rig", "table1", *axes, *beside, "--json"])
+        assert stop.value.code == 0
+        areas.append(json.loads(capsys.readouterr().out)["stable_area"])
+    assert areas[0] == areas[1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("option", "typed"), [("--speed", "-120 rpm"), ("--speed", "0 rpm"), ("--rop", "-1 ft/h")]
+)
+def test_what_was_typed_is_named_in_its_own_units(capsys, option, typed):
+    point = {"--rig": "table1", "--speed": "120 rpm", "--rop": "20 m/h", option: typed}
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["analyze", *(word for pair in point.items() for word in pair)])
+    assert stop.value.code == 2
+    assert f"{option} = {typed}: must be" in capsys.readouterr().err

@@ -55,6 +55,16 @@ def read_axis(option: str, text: str) -> tuple[str, object, object]:
     return name.strip(), limits[0], limits[1]
 
 
+def _with_axes(point: dict[str, Any], *axes: tuple[str, object, object]) -> dict[str, Any]:
+    """Return the options of the point, those that are axes at the upper end of theirs."""
+    given = dict(point)
+    for name, _, high in axes:
+        free = name == "speed" or (name == "rop" and given.get("wob") is None)
+        if given.get("rig") is not None and free and given[name] is None:
+            given[name] = high
+    return given
+
+
 @click.command(name="chart", cls=Verb)
 @point_options
 @click.option("--x", "x_axis", default="omega0=0.5:25", show_default=True, metavar="NAME=LOW:HIGH")
@@ -120,8 +130,8 @@ def chart_command(
         check_json(out)
     check_folder("--out", out)
     check_figure(plot)
-    where = read_point(point)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
+    where = read_point(_with_axes(point, x, y))
     gains = read_gains("K1", k1), read_gains("K2", k2)
     result: StabilityChart | StabilisableChart | StabilityVolume
     if z_axis is not None:

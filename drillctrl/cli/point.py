@@ -107,6 +107,10 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
         strength = units.to_si("--rock-strength", given["rock_strength"], units.STRESS)
         rig = rig.with_rock_strength(strength)
     speed = units.to_si("--speed", given["speed"], units.ROTARY_SPEED)
+    if not speed > 0.0:
+        raise InputError("--speed", given["speed"], "above 0: the sense in which the bit cuts")
+    if "rop" in given and units.to_si("--rop", given["rop"], units.SPEED) < 0.0:
+        raise InputError("--rop", given["rop"], "at least 0 m/h")
     if "wob" in given:
         return rig_point_at_weight_on_bit(
             rig, speed, units.to_si("--wob", given["wob"], units.FORCE)

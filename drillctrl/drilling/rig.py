@@ -189,7 +189,7 @@ def rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
             raise InputError(f"key in {source}", key, f"one of {', '.join(known)}{hint}")
     missing = [k for k in known if k not in data and k != "blades"]
     if missing:
-        raise InputError(f"{missing[0]} in {source}", "(missing)", "given")
+        raise InputError(f"{', '.join(missing)} in {source}", "(missing)", "given")
     values: dict[str, Any] = {}
     for key, value in data.items():
         dimension: Dimension | None = known[key].metadata.get("dimension")
