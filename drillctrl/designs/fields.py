@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from drillctrl.base.text import finite_or_none
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import steady_state
 from drillctrl.spectrum.roots import Root
 
-if TYPE_CHECKING:
-    from drillctrl.designs.result import Analysis, Design
 
-
-def result_fields(result: Analysis) -> dict[str, Any]:
+def result_fields(result: AnalysisValues) -> dict[str, Any]:
     """Return the JSON fields of what `analyze` returns."""
     point = result.point
     structure = result.structure
@@ -46,7 +44,7 @@ def result_fields(result: Analysis) -> dict[str, Any]:
     return fields
 
 
-def design_fields(design: Design) -> dict[str, Any]:
+def design_fields(design: DesignValues) -> dict[str, Any]:
     """Return the JSON fields of what `design` returns."""
     fields = {**result_fields(design), "schema": "drillctrl/design/1"}
     fields["certificate"]["optimality"] = dataclasses.asdict(design.optimality)
@@ -59,7 +57,7 @@ def design_fields(design: Design) -> dict[str, Any]:
     return fields
 
 
-def _objective_fields(design: Design) -> dict[str, Any]:
+def _objective_fields(design: DesignValues) -> dict[str, Any]:
     return {
         "name": design.objective.name,
         **dataclasses.asdict(design.objective),
@@ -89,7 +87,7 @@ def _root_fields(root: Root) -> dict[str, Any]:
     }
 
 
-def _loop_fields(design: Analysis) -> dict[str, Any]:
+def _loop_fields(design: AnalysisValues) -> dict[str, Any]:
     loop, radius = design.loop, design.spectral_radius
     return {
         "spectral_abscissa": loop.spectral_abscissa,
@@ -112,7 +110,7 @@ def _loop_fields(design: Analysis) -> dict[str, Any]:
     }
 
 
-def _rig_fields(rig_point: RigPoint, design: Analysis) -> dict[str, Any]:
+def _rig_fields(rig_point: RigPoint, design: AnalysisValues) -> dict[str, Any]:
     steady = steady_state(rig_point)
     fields: dict[str, Any] = {
         "parameters": dataclasses.asdict(rig_point.rig),

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from drillctrl.base import units
 from drillctrl.designs.loop_analysis import LoopAnalysis
+from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.designs.worst_case import WorstCase
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.steady import steady_state
 from drillctrl.simulation.outcome import Figures
 from drillctrl.simulation.status import Outcome
 from drillctrl.synthesis.objectives import Robust, SemiDiscrete
-
-if TYPE_CHECKING:
-    from drillctrl.designs.result import Analysis, Design
 
 Lines = list[tuple[str, str]]
 
@@ -30,7 +27,7 @@ def set_out(lines: Sequence[tuple[str, str]]) -> str:
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
 
 
-def result_lines(result: Analysis) -> Lines:
+def result_lines(result: AnalysisValues) -> Lines:
     """Return what is known of gains, or of an open loop."""
     word = "stabilised" if result.stable else "not stabilised"
     if result.structure is None:
@@ -38,7 +35,7 @@ def result_lines(result: Analysis) -> Lines:
     return [*_opening(result), *_loop_lines(result, f"{word}: α = ", [])]
 
 
-def design_lines(design: Design) -> Lines:
+def design_lines(design: DesignValues) -> Lines:
     """Return what is known of gains that were designed."""
     word = "stabilised: α = " if design.stable else "not stabilised: best α = "
     best = design.optimality
@@ -56,11 +53,11 @@ def design_lines(design: Design) -> Lines:
     ]
 
 
-def _opening(result: Analysis) -> Lines:
+def _opening(result: AnalysisValues) -> Lines:
     return [*_trial_lines(result), *_point_lines(result), *_gain_lines(result)]
 
 
-def _trial_lines(result: Analysis) -> Lines:
+def _trial_lines(result: AnalysisValues) -> Lines:
     """Say first whether the gains can be recommended, and what the runs showed."""
     if result.structure is None:
         return []
@@ -91,7 +88,7 @@ def _figures_text(found: Figures) -> str:
     return text
 
 
-def _input_text(result: Analysis, largest: float) -> str:
+def _input_text(result: AnalysisValues, largest: float) -> str:
     assert result.structure is not None
     if result.rig_point is None or result.structure.inputs != ("torque",):
         return f"{largest:.3g}"
@@ -103,7 +100,7 @@ def _root_text(s: complex) -> str:
     return f"{s.real:.4g}" + (f" ± {s.imag:.4g}i" if s.imag else "")
 
 
-def _point_lines(result: Analysis) -> Lines:
+def _point_lines(result: AnalysisValues) -> Lines:
     p = result.point
     lines: Lines = []
     if result.rig_point is not None:
@@ -148,7 +145,7 @@ def alpha_text(loop: LoopAnalysis) -> str:
     return text if error < 1e-10 else f"{text} ± {error:.1g}"
 
 
-def _gain_lines(result: Analysis) -> Lines:
+def _gain_lines(result: AnalysisValues) -> Lines:
     structure = result.structure
     if structure is None:
         return []
@@ -174,7 +171,7 @@ def _gain_lines(result: Analysis) -> Lines:
     return lines
 
 
-def _loop_lines(result: Analysis, word: str, aims: Lines) -> Lines:
+def _loop_lines(result: AnalysisValues, word: str, aims: Lines) -> Lines:
     loop = result.loop
     lines: Lines = [("Result", f"{word}{alpha_text(loop)}"), *aims]
     roots = [
@@ -207,7 +204,7 @@ def _loop_lines(result: Analysis, word: str, aims: Lines) -> Lines:
     return lines
 
 
-def _objective_lines(design: Design) -> Lines:
+def _objective_lines(design: DesignValues) -> Lines:
     """Say what was minimised and required, where that is not the spectral abscissa alone."""
     lines: Lines = []
     match design.objective:
