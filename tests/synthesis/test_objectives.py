@@ -208,3 +208,13 @@ def test_a_worst_case_needs_an_operating_point():
 
 def test_exact_is_the_default(point_c):
     assert design(point_c, "p").objective == Exact()
+
+
+@pytest.mark.parametrize(("name", "alpha"), [("p", -0.169953919), ("pd", -0.783302734)])
+def test_wider_bounds_give_no_worse_gains(point_c, name, alpha):
+    found = [
+        design(point_c, name, bounds={"K1": (-size, size)}, trials=False).spectral_abscissa
+        for size in (10.0, 1000.0, 1e4)
+    ]
+    assert found[2] <= found[1] + 1e-9 <= found[0] + 2e-9
+    assert found[1] == pytest.approx(alpha, abs=1e-8)
