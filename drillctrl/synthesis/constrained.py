@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.certificate import OptimalityCertificate, shortest_combination
@@ -17,6 +18,7 @@ _LOOKED = 64
 _BEGUN = 6
 _WEIGHTS = (1.0, 10.0, 100.0)
 _SAMPLED_RADIUS = 1e-4
+_CREEP = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,8 @@ def constrained_search(
                 ends.append(float(objective(gains)[0]))
                 break
             gains = np.clip(gains, lower + 1e-6 * margin, upper - 1e-6 * margin)
+    if np.isfinite(watched.best[0]):
+        _finish(watched, lower, upper)
     feasible = bool(np.isfinite(watched.best[0]))
     value, gains = watched.best if feasible else watched.nearest[1:]
     # A bound that is approached to rounding is meant.
@@ -133,6 +137,24 @@ def constrained_search(
             distinct.append(end)
     hits = sum(end < value + 1e-4 * (1.0 + abs(value)) for end in ends)
     return ConstrainedSearch(gains, value, feasible, tuple(distinct), hits, watched.calls)
+
+
+def _finish(watched: _Watched, lower: FloatArray, upper: FloatArray) -> None:
+    """Creep on from the best gains without gradients, which mislead at a cusp of many roots."""
+    best = watched.best[1]
+    steps = np.vstack([np.zeros(best.size), np.diag(_CREEP * (upper - lower))])
+    inward = np.where(best > 0.5 * (lower + upper), -1.0, 1.0)
+    scipy.optimize.minimize(
+        lambda gains: watched(np.clip(gains, lower, upper))[0],
+        best,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": best + inward * steps,
+            "xatol": 1e-9,
+            "fatol": 1e-12,
+            "maxfev": 80 * best.size,
+        },
+    )
 
 
 def certify_sampled(

@@ -218,3 +218,12 @@ def test_wider_bounds_give_no_worse_gains(point_c, name, alpha):
     ]
     assert found[2] <= found[1] + 1e-9 <= found[0] + 2e-9
     assert found[1] == pytest.approx(alpha, abs=1e-8)
+
+
+@pytest.mark.parametrize(("m", "order"), [(40, 0), (40, 2)])
+def test_the_semi_discretised_optimum_is_reached(point_c, m, order):
+    found = design(point_c, "case1", objective=SemiDiscrete(m, order), trials=False)
+    # By an exhaustive search with another method: -0.811928 and -0.811925.
+    assert found.objective_value < -0.81191
+    loop = semidiscretize(found.system(), m, order)
+    assert loop.growth_rate == pytest.approx(found.objective_value, abs=1e-12)
