@@ -16,6 +16,7 @@ from .charts.volume import stability_volume as stability_volume
 from .delay.closing import close_loop as close_loop
 from .delay.instrumentation import with_actuator_lag as with_actuator_lag
 from .delay.instrumentation import with_filter as with_filter
+from .delay.instrumentation import with_late_output as with_late_output
 from .delay.structure import FeedbackStructure as FeedbackStructure
 from .delay.structure import Tie as Tie
 from .delay.system import DelaySystem as DelaySystem

@@ -55,6 +55,8 @@ def close_loop(
 ) -> DelaySystem:
     """Close the loop: A0 + B K1 C and Aτ + B K2 C (Eq. 40).
 
+    A delayed input or output makes a delayed term of each gain, with nothing approximated.
+
     Parameters
     ----------
     system : DelaySystem
@@ -64,26 +66,65 @@ def close_loop(
     K1, K2 : array_like, (m, p) or flat
         Gains on Y(t) and on Y(t − delay).
     delay : float, optional
-        Delay of the fed-back signals; by default the largest delay of the plant.
+        Delay of the fed-back signals; by default the system's own ``feedback_delay``.
 
     Returns
     -------
     DelaySystem
         The same states, inputs and outputs; u is what is added to the feedback.
     """
-    now, past = gain_matrices(feedback, K1, K2)
-    drive, measure = loop_channels(system, feedback)
-    delay = system.max_delay if delay is None else checked_number("delay", delay, 0.0)
-    matrices = dict(zip(system.delays, system.delayed, strict=True))
-    if past.any():
-        matrices[delay] = system.delayed_matrix(delay) + drive @ past @ measure
-    delays = tuple(sorted(matrices))
+    gains = np.stack(gain_matrices(feedback, K1, K2))
+    return with_terms(
+        system, *loop_channels(system, feedback), gains, feedback_lags(system, feedback, delay)
+    )
+
+
+def with_terms(
+    system: DelaySystem, drive: FloatArray, measure: FloatArray, gains: FloatArray, lags: FloatArray
+) -> DelaySystem:
+    """Add the terms of gains that act through lags.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    drive, measure : array, (n, m) and (p, n)
+        Columns of B and rows of C.
+    gains, lags : array, (2, m, p)
+        K1 and K2, and the delay of each entry.
+    """
+    matrices = {0.0: system.A0, **dict(zip(system.delays, system.delayed, strict=True))}
+    for lag in np.unique(lags[gains != 0.0]).tolist():
+        part = np.where(lags == lag, gains, 0.0).sum(axis=0)
+        matrices[lag] = system.delayed_matrix(lag) if lag else system.A0
+        matrices[lag] = matrices[lag] + drive @ part @ measure
+    delays = tuple(sorted(matrices))[1:]
     return replace(
         system,
-        A0=system.A0 + drive @ now @ measure,
+        A0=matrices[0.0],
         delayed=tuple(matrices[tau] for tau in delays),
         delays=delays,
     )
+
+
+def feedback_lags(
+    system: DelaySystem, feedback: FeedbackStructure, delay: float | None = None
+) -> FloatArray:
+    """Return the delay through which each entry of K1 and K2 acts, (2, m, p).
+
+    It is that of the input and of the output together, and that of the feedback for K2.
+
+    Parameters
+    ----------
+    system, feedback : DelaySystem and FeedbackStructure
+        The plant, and its inputs and outputs that are used.
+    delay : float, optional
+        As for `close_loop`.
+    """
+    late = system.feedback_delay if delay is None else checked_number("delay", delay, 0.0)
+    acts = [system.input_delays[system.input_names.index(name)] for name in feedback.inputs]
+    seen = [system.output_delays[system.output_names.index(name)] for name in feedback.outputs]
+    return np.asarray(np.add.outer([0.0, late], np.add.outer(acts, seen)), dtype=float)
 
 
 def loop_channels(

@@ -51,8 +51,10 @@ def with_filter(
     for tau, matrix in late.items():
         matrices[tau] = zero.copy()
         matrices[tau][:n, :n] = matrix
-    entering = now if age == 0.0 else matrices.setdefault(age, zero.copy())
-    entering[n:, :n] += measured
+    for i, row in enumerate(rows):
+        old = age + system.output_delays[row]
+        entering = now if old == 0.0 else matrices.setdefault(old, zero.copy())
+        entering[n + i, :n] += measured[i]
     seen = np.zeros((len(system.C) + more, n + more))
     seen[: len(system.C), :n] = system.C
     seen[len(system.C) :, n:] = np.eye(more)
@@ -66,6 +68,40 @@ def with_filter(
         C=seen,
         state_names=(*system.state_names, *added),
         output_names=(*system.output_names, *added),
+        output_delays=(*system.output_delays, *[0.0] * more),
+    )
+
+
+def with_late_output(
+    system: DelaySystem, name: str, delay: float, late_name: str | None = None
+) -> DelaySystem:
+    """Return a system with one more output: one that there is, seen later.
+
+    So a controller may use one signal with several delays.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    name : str
+        The output.
+    delay : float
+        How much later, ≥ 0.
+    late_name : str, optional
+        Of the further output; ``NAME_late`` without it.
+
+    Raises
+    ------
+    InputError
+        If there is no such output, the name is taken, or the delay is out of range.
+    """
+    row = _index(system.output_names, name, "output")
+    later = system.output_delays[row] + checked_number("delay", delay, 0.0, 1e9)
+    return replace(
+        system,
+        C=np.vstack([system.C, system.C[row]]),
+        output_names=(*system.output_names, late_name or f"{name}_late"),
+        output_delays=(*system.output_delays, later),
     )
 
 

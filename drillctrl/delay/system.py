@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, checked_number
 
 # Rows and columns whose sums differ by more than this are scaled.
 _UNBALANCED = 1e3
@@ -48,7 +48,7 @@ def _in_order(
 
 @dataclass(frozen=True, eq=False)
 class DelaySystem:
-    """A linear time-invariant system of retarded type.
+    """A linear time-invariant system of retarded type, with delays at its inputs and outputs too.
 
     Attributes
     ----------
@@ -65,6 +65,10 @@ class DelaySystem:
         Yields the outputs; without it all states are outputs.
     state_names, input_names, output_names : tuple of str
         Names in order.
+    input_delays, output_delays : tuple of float
+        ≥ 0, how late each input acts and each output is seen; without them they are 0.
+    feedback_delay : float
+        τ ≥ 0 of K2 in u = K1 Y(t) + K2 Y(t − τ); the largest of ``delays`` if it is not given.
 
     Raises
     ------
@@ -81,6 +85,9 @@ class DelaySystem:
     state_names: tuple[str, ...] = ()
     input_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
+    input_delays: tuple[float, ...] = ()
+    output_delays: tuple[float, ...] = ()
+    feedback_delay: float = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         a0 = _matrix("A0", self.A0, (None, None))
@@ -114,6 +121,13 @@ class DelaySystem:
             if len(names) != size or len(set(names)) != size:
                 raise InputError(field, names, f"{size} different names")
             put(field, names)
+        for field, size in (("input_delays", self.B.shape[1]), ("output_delays", len(self.C))):
+            late = tuple(float(delay) for delay in getattr(self, field)) or (0.0,) * size
+            if len(late) != size or not all(0.0 <= delay < np.inf for delay in late):
+                raise InputError(field, late, f"{size} numbers, finite and ≥ 0")
+            put(field, late)
+        fed_back = self.max_delay if self.feedback_delay is None else self.feedback_delay
+        put("feedback_delay", checked_number("feedback_delay", fed_back, 0.0))
 
     @property
     def order(self) -> int:
@@ -145,15 +159,15 @@ class DelaySystem:
 
         Every characteristic root is multiplied by ``unit``.
         """
-        return DelaySystem(
-            self.A0 * unit,
-            tuple(a * unit for a in self.delayed),
-            tuple(tau / unit for tau in self.delays),
-            self.B * unit,
-            self.C,
-            self.state_names,
-            self.input_names,
-            self.output_names,
+        return replace(
+            self,
+            A0=self.A0 * unit,
+            delayed=tuple(a * unit for a in self.delayed),
+            delays=tuple(tau / unit for tau in self.delays),
+            B=self.B * unit,
+            input_delays=tuple(tau / unit for tau in self.input_delays),
+            output_delays=tuple(tau / unit for tau in self.output_delays),
+            feedback_delay=self.feedback_delay / unit,
         )
 
     @functools.cached_property
@@ -170,15 +184,12 @@ class DelaySystem:
             return self
         _, (scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
         ratio = scale[None, :] / scale[:, None]
-        return DelaySystem(
-            self.A0 * ratio,
-            tuple(a * ratio for a in self.delayed),
-            self.delays,
-            self.B / scale[:, None],
-            self.C * scale,
-            self.state_names,
-            self.input_names,
-            self.output_names,
+        return replace(
+            self,
+            A0=self.A0 * ratio,
+            delayed=tuple(a * ratio for a in self.delayed),
+            B=self.B / scale[:, None],
+            C=self.C * scale,
         )
 
 

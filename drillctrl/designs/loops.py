@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.closing import loop_channels
+from drillctrl.delay.closing import feedback_lags, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.drilling.case import Case, Where, as_case
@@ -74,15 +74,28 @@ def spectral_abscissas(
             case.with_changes(**{name: float(value)})
     a0, left, right, delay = plant_arrays(case, varied, count)
     if structure is not None and vectors is not None:
-        drive, measure = loop_channels(case.system(), structure)
-        now, past = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
-        a0 = a0 + drive @ now @ measure
-        if past.any():
-            if feedback_delay is not None:
-                own = np.full((count, drive.shape[1]), feedback_delay)
-                delay = np.concatenate([np.tile(delay[:, None], left.shape[2]), own], axis=1)
-            left = np.concatenate([left, np.broadcast_to(drive, (count, *drive.shape))], axis=2)
-            right = np.concatenate([right, past @ measure], axis=1)
+        system = case.system()
+        drive, measure = loop_channels(system, structure)
+        gains = _gain_arrays(structure, np.broadcast_to(vectors, (count, vectors.shape[1])))
+        own = system.feedback_delay if feedback_delay is None else feedback_delay
+        follows = case.drills and feedback_delay is None
+        lags = feedback_lags(system, structure, own)
+        for is_late in (False, True):
+            for extra in np.unique(lags[0]).tolist():
+                part = np.where(lags[0] == extra, gains[is_late], 0.0)
+                lag = (delay if follows else np.full(count, own)) * is_late + extra
+                if not part.any():
+                    continue
+                if not lag.any():
+                    a0 = a0 + drive @ part @ measure
+                    continue
+                if delay.ndim == 1 and not np.array_equal(lag, delay):
+                    delay = np.repeat(delay[:, None], left.shape[2], axis=1)
+                if delay.ndim == 2:
+                    more = np.repeat(lag[:, None], drive.shape[1], axis=1)
+                    delay = np.concatenate([delay, more], axis=1)
+                left = np.concatenate([left, np.broadcast_to(drive, (count, *drive.shape))], axis=2)
+                right = np.concatenate([right, part @ measure], axis=1)
     return batch_abscissas(a0, left, right, delay, workers)
 
 
@@ -132,6 +145,18 @@ def _one_delay(system: DelaySystem) -> tuple[FloatArray, FloatArray]:
     return system.factors[0]
 
 
+def _check_lags(case: Case, structure: FeedbackStructure) -> None:
+    """Refuse feedback with other delays than the plant's."""
+    if case.drills:
+        return
+    system = case.system()
+    now, late = feedback_lags(system, structure)
+    uses_late = structure.K2_lower.any() or structure.K2_upper.any()
+    if now.any() or (uses_late and (late != system.max_delay).any()):
+        lags = sorted({*now.ravel().tolist(), *late.ravel().tolist()})
+        raise InputError("delays of the feedback", lags, f"0 and {system.max_delay:g} here")
+
+
 def loop_arrays(
     case: Case,
     values: Mapping[str, npt.ArrayLike],
@@ -155,6 +180,7 @@ def loop_arrays(
     a1 = left @ right
     if structure is not None:
         drive, measure = loop_channels(case.system(), structure)
+        _check_lags(case, structure)
         a0, a1 = a0 + drive @ K1 @ measure, a1 + drive @ K2 @ measure
     return np.ascontiguousarray(a0), np.ascontiguousarray(a1), tau
 

@@ -41,7 +41,7 @@ def point_margins(
     """
     case, inputs = as_case(point), feedback.inputs
     _, here = case.physics("a margin of the point")
-    assumed = case.system(inputs).max_delay
+    assumed = case.system(inputs).feedback_delay
     gains, late = feedback.vector(K1, K2), len(case.system(inputs).delays) > 1
 
     def margin(name: str) -> ParameterMargin:

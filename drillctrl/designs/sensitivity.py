@@ -59,12 +59,14 @@ def root_sensitivity(
     Raises
     ------
     InputError
-        If the root is multiple: it has no derivative there.
+        If the root is multiple: it has no derivative there. If signals of the plant arrive late.
     """
     case = as_case(point)
     plant, _ = case.physics("the derivative of a root")
     inputs = structure.inputs if structure else ("torque",)
     open_loop = case.system(inputs)
+    if len(open_loop.delays) > 1:
+        raise InputError("plant", "with signals that arrive late", "of one delay here")
     loop = open_loop
     if structure is not None:
         loop = close_loop(open_loop, structure, np.asarray(K1), K2)
@@ -75,7 +77,7 @@ def root_sensitivity(
     if root.multiplicity > 1:
         raise InputError("index", index, f"a simple root, this is {root.multiplicity}-fold")
     d_a0, d_delayed, d_tau = matrix_sensitivity(loop, root.value)
-    at = loop.delays.index(open_loop.max_delay)
+    at = loop.delays.index(open_loop.feedback_delay)
     gains = [np.zeros((0, 0), dtype=complex)] * 2
     if structure is not None:
         drive, measure = loop_channels(open_loop, structure)

@@ -147,6 +147,7 @@ class Case:
             state_names=plant.state_names,
             input_names=chosen,
             output_names=plant.output_names,
+            feedback_delay=float(values.delay[0]),
         )
 
     def table(self, values: Mapping[str, npt.ArrayLike], count: int) -> FloatArray:

@@ -41,6 +41,7 @@ def lifted_system(system: DelaySystem, m: int | None = None, order: int = 1) -> 
     """
     control = required("control", "control")
 
+    _check_channels(system)
     scheme = semidiscretize(system, m, order)
     matrix = scheme.matrix()
     n, inputs = system.B.shape
@@ -63,6 +64,11 @@ def lifted_system(system: DelaySystem, m: int | None = None, order: int = 1) -> 
         inputs=list(system.input_names),
         outputs=list(system.output_names),
     )
+
+
+def _check_channels(system: DelaySystem) -> None:
+    if any(system.input_delays) or any(system.output_delays):
+        raise InputError("system", "with late inputs or outputs", "without them here")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +118,7 @@ def pade_approximation(
     control = required("control", "control")
 
     degree = checked_integer("degree", degree, 1, 20)
+    _check_channels(system)
     if not system.delays or not system.B.size or not system.C.size:
         raise InputError("system", "without delay, input or output", "one with all three")
     n = system.order

@@ -1,13 +1,14 @@
-"""A python-control plant with a delay as a DelaySystem."""
+"""A python-control plant with delays as a DelaySystem."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError
 from drillctrl.delay.system import DelaySystem
 
 if TYPE_CHECKING:
@@ -16,41 +17,54 @@ if TYPE_CHECKING:
 
 def from_control(
     plant: control.StateSpace,
-    delay: float,
-    delayed: npt.ArrayLike | None = None,
+    input_delay: float | Sequence[float] = 0.0,
+    *,
+    output_delay: float | Sequence[float] = 0.0,
+    delayed: Mapping[float, npt.ArrayLike] | None = None,
+    feedback_delay: float | None = None,
 ) -> DelaySystem:
-    """Return a continuous python-control plant with a delay as a `DelaySystem`.
+    """Return a continuous python-control plant with delays as a `DelaySystem`.
 
     Parameters
     ----------
     plant : control.StateSpace
         X' = A X + B u, Y = C X; names are kept.
-    delay : float
-        τ > 0.
-    delayed : array_like, (n, n), optional
-        A1 in X' = A X(t) + A1 X(t − τ) + B u. Without it the plant itself has no delay, and
-        τ is that of the fed-back signals: a loop with a delay in its input or its
-        measurement is one whose structure feeds back Y(t − τ) only, K1 = 0.
+    input_delay, output_delay : float or sequence of float
+        How late inputs act and outputs are seen, of all or of each.
+    delayed : mapping of float to array_like, (n, n), optional
+        τi → Ai in X' = A X(t) + Σ Ai X(t − τi) + B u.
+    feedback_delay : float, optional
+        τ of K2 Y(t − τ), counted from when Y is seen; by default the largest of ``delayed``.
 
     Raises
     ------
     InputError
-        If the plant is sampled, feeds its input through, or shapes do not fit.
+        If the plant is no state-space system, is sampled, feeds its input through, or shapes do
+        not fit.
     """
+    if not all(hasattr(plant, name) for name in ("A", "B", "C", "D")):
+        raise InputError("plant", type(plant).__name__, "a state-space system: control.ss(plant)")
     if plant.dt:
         raise InputError("plant", f"sampled every {plant.dt}", "in continuous time")
     if np.any(plant.D):
         raise InputError("plant", "with direct feedthrough D", "with D = 0")
-    tau = checked_number("delay", delay, 0.0, open_low=True)
-    a = np.asarray(plant.A, dtype=float)
-    past = np.zeros_like(a) if delayed is None else np.asarray(delayed, dtype=float)
+    terms = {} if delayed is None else dict(delayed)
+    b, c = np.asarray(plant.B, dtype=float), np.asarray(plant.C, dtype=float)
     return DelaySystem(
-        a,
-        (past,),
-        (tau,),
-        np.asarray(plant.B, dtype=float),
-        np.asarray(plant.C, dtype=float),
+        np.asarray(plant.A, dtype=float),
+        tuple(np.asarray(matrix, dtype=float) for matrix in terms.values()),
+        tuple(terms),
+        b,
+        c,
         state_names=tuple(plant.state_labels),
         input_names=tuple(plant.input_labels),
         output_names=tuple(plant.output_labels),
+        input_delays=_of_each(input_delay, b.shape[1]),
+        output_delays=_of_each(output_delay, len(c)),
+        feedback_delay=feedback_delay,  # type: ignore[arg-type]
     )
+
+
+def _of_each(delay: float | Sequence[float], count: int) -> tuple[float, ...]:
+    given = np.asarray(delay, dtype=float)
+    return tuple(given.tolist()) if given.ndim else (float(given),) * count

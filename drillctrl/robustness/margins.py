@@ -187,4 +187,14 @@ def _first_unstable(
 def with_delay_factor(system: DelaySystem, factor: float) -> DelaySystem:
     """Return the system with every delay multiplied by ``factor`` > 0."""
     checked_number("factor", factor, 0.0, open_low=True)
-    return replace(system, delays=tuple(tau * factor for tau in system.delays))
+
+    def longer(delays: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(factor * tau for tau in delays)
+
+    return replace(
+        system,
+        delays=longer(system.delays),
+        input_delays=longer(system.input_delays),
+        output_delays=longer(system.output_delays),
+        feedback_delay=factor * system.feedback_delay,
+    )

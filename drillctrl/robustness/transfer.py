@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.closing import gain_matrices, loop_channels
+from drillctrl.delay.closing import feedback_lags, gain_matrices, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-
-if TYPE_CHECKING:
-    pass
 
 _COARSEST = 0.02
 _MAX_POINTS = 20_000
@@ -24,7 +19,7 @@ _AT_ONCE = 100_000
 
 
 def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArray:
-    """Return G(iω) = C Δ(iω)⁻¹ B without any approximation of the delays.
+    """Return G(iω) = C Δ(iω)⁻¹ B, late inputs and outputs included, with no approximation.
 
     Parameters
     ----------
@@ -41,8 +36,9 @@ def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArra
     points = np.atleast_1d(np.asarray(omega, dtype=float))
     if not np.isfinite(points).all():
         raise InputError("omega", "an array with NaN or infinity", "finite")
-    response = system.C @ _responses(system, system.B, points)
-    return np.asarray(np.moveaxis(response, 0, -1))
+    response = np.moveaxis(system.C @ _responses(system, system.B, points), 0, -1)
+    lags = np.add.outer(system.output_delays, system.input_delays)
+    return np.asarray(response * np.exp(-1j * np.multiply.outer(lags, points)))
 
 
 def loop_transfer(
@@ -55,7 +51,8 @@ def loop_transfer(
     """Return L(iω), the loop broken at the plant input, for negative feedback.
 
     The closed loop has the characteristic equation det(I + L) = 0, with
-    L = −(K1 + K2 exp(−iωτ0)) C Δ⁻¹ B: the sign that margins are read with.
+    L = −(K1 + K2 exp(−iωτ)) C Δ⁻¹ B, late inputs and outputs included: the sign that margins
+    are read with.
 
     Parameters
     ----------
@@ -70,11 +67,11 @@ def loop_transfer(
     -------
     array, (m, m, q)
     """
-    now, past = gain_matrices(structure, K1, K2)
+    gains = np.stack(gain_matrices(structure, K1, K2))
     drive, measure = loop_channels(system, structure)
     points = np.atleast_1d(np.asarray(omega, dtype=float))
-    lag = np.exp(-1j * points * system.max_delay)[:, None, None]
-    transfer = -(now + past * lag) @ measure @ _responses(system, drive, points)
+    turned = np.exp(-1j * np.multiply.outer(points, feedback_lags(system, structure)))
+    transfer = -(gains * turned).sum(axis=1) @ measure @ _responses(system, drive, points)
     return np.asarray(np.moveaxis(transfer, 0, -1))
 
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.delay.closing import close_loop, loop_channels
+from drillctrl.delay.closing import close_loop, feedback_lags, loop_channels, with_terms
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
 from drillctrl.synthesis.expansion import Expansion, expand
-
-BoolArray = npt.NDArray[np.bool_]
 
 _CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
 
@@ -70,8 +67,8 @@ class LoopFamily:
         The loop with the fixed gains only.
     drive, seen : array, (n, c) and (c, n)
         The same columns and rows in the states of the plant.
-    late : bool array, (c,)
-        Which entries act on a delayed output.
+    lags : array, (c,)
+        Delay through which each entry acts.
     degree : int
         Of the collocation.
     """
@@ -85,7 +82,7 @@ class LoopFamily:
     plain: DelaySystem
     drive: FloatArray
     seen: FloatArray
-    late: BoolArray
+    lags: FloatArray
     degree: int
 
     def loop(self, gains: FloatArray) -> DelaySystem:
@@ -190,7 +187,7 @@ class LoopFamily:
         """The determinant as a quasi-polynomial; None with several inputs or delays."""
         if not self.is_affine or len(self.plain.delays) > 1:
             return None
-        return expand(self.plain, self.drive, self.seen, self.late)
+        return expand(self.plain, self.drive, self.seen, self.lags > 0.0)
 
     def taylor(
         self, s: ComplexArray, gains: FloatArray, terms: int
@@ -226,8 +223,7 @@ class LoopFamily:
 
     def seen_at(self, s: ComplexArray) -> ComplexArray:
         """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
-        lag = np.exp(-s * self.plain.max_delay)
-        return np.asarray(np.where(self.late, lag[:, None], 1.0)[:, :, None] * self.seen)
+        return np.asarray(np.exp(-np.multiply.outer(s, self.lags))[:, :, None] * self.seen)
 
     def characteristic_matrix(self, s: ComplexArray, gains: FloatArray) -> ComplexArray:
         """Return Δ(s) of the loop at a gain vector, (q, n, n)."""
@@ -256,36 +252,41 @@ def loop_family(
         Of the collocation; by default what the largest gains within the bounds need.
     """
     drive, measure = loop_channels(system, feedback)
-    half, shape = feedback.K1_lower.size, feedback.K1_lower.shape
     spread = feedback.spread
     entries = np.flatnonzero(spread.any(axis=1))
-    late = entries >= half
-    target, source = (entries % half) // shape[1], (entries % half) % shape[1]
-    fixed = feedback.fixed
-    plain = close_loop(system, feedback, fixed[:half].reshape(shape), fixed[half:].reshape(shape))
-    # Carry what the plant delays anyway and the measured outputs that are fed back late.
-    if late.any() and not system.delays:
+    every_lag = feedback_lags(system, feedback)
+    late, target, source = np.unravel_index(entries, every_lag.shape)
+    lags = every_lag.ravel()[entries]
+    if late.any() and not system.feedback_delay:
         raise InputError("structure", feedback.name, "without delayed outputs: no delay is known")
+    plain = with_terms(system, drive, measure, feedback.fixed.reshape(every_lag.shape), every_lag)
+    # Carry what the plant delays anyway and the measured outputs that are fed back late.
     nothing = np.zeros((system.order, 0)), np.zeros((0, system.order))
-    left, right = plain.factors[-1] if plain.factors else nothing
-    for output in sorted(set(source[late].tolist())):
+    carried = dict(zip(plain.delays, plain.factors, strict=True))
+    used = {pair for pair in zip(lags.tolist(), source.tolist(), strict=True) if pair[0]}
+    for lag, output in sorted(used):
+        left, right = carried.get(lag, nothing)
         wider = np.vstack([right, measure[output]])
         if np.linalg.matrix_rank(wider) > right.shape[0]:
-            right = wider
-    left = np.hstack([left, np.zeros((left.shape[0], right.shape[0] - left.shape[1]))])
-    factors = (*plain.factors[:-1], (left, right)) if plain.factors else ()
+            left, right = np.hstack([left, np.zeros((system.order, 1))]), wider
+        carried[lag] = left, right
+    delays = tuple(sorted(carried))
+    plain = replace(plain, delays=delays, delayed=tuple(map(plain.delayed_matrix, delays)))
     if degree is None:
         # Three more than suffices to start an iteration on the characteristic equation.
         degree = degree_for(_largest(system, feedback), 0.0) + 3
-    base = generator_matrix(plain, degree, factors)
-    size, n, rank = base.shape[0], system.order, right.shape[0]
+    base = generator_matrix(plain, degree, [carried[delay] for delay in delays])
+    size, n = base.shape[0], system.order
+    # The oldest values of the signals of each delay.
+    ends = n + degree * np.cumsum([carried[delay][1].shape[0] for delay in delays], dtype=int)
     actuation = np.zeros((size, entries.size))
     actuation[:n] = drive[:, target]
     measurement = np.zeros((entries.size, size))
-    for row, output in enumerate(source):
-        if late[row]:
+    for row, (lag, output) in enumerate(zip(lags.tolist(), source, strict=True)):
+        if lag:
+            right, end = carried[lag][1], ends[delays.index(lag)]
             weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
-            measurement[row, size - rank :] = weights
+            measurement[row, end - right.shape[0] : end] = weights
         else:
             measurement[row, :n] = measure[output]
     return LoopFamily(
@@ -298,20 +299,15 @@ def loop_family(
         plain,
         actuation[:n],
         measure[source],
-        late,
+        lags,
         degree,
     )
 
 
 def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:
     """Return a loop whose matrices bound those of every loop in the family."""
-    drive, measure = loop_channels(system, feedback)
-    now = np.maximum(np.abs(feedback.K1_lower), np.abs(feedback.K1_upper))
-    past = np.maximum(np.abs(feedback.K2_lower), np.abs(feedback.K2_upper))
-    lag = system.max_delay
-    delayed = tuple(
-        np.abs(a) + (np.abs(drive) @ past @ np.abs(measure) if tau == lag else 0.0)
-        for tau, a in zip(system.delays, system.delayed, strict=True)
-    )
-    magnitude = np.abs(system.A0) + np.abs(drive) @ now @ np.abs(measure)
-    return DelaySystem(magnitude, delayed, system.delays, system.B, system.C)
+    drive, measure = (np.abs(channel) for channel in loop_channels(system, feedback))
+    lags = feedback_lags(system, feedback)
+    gains = np.maximum(np.abs(feedback.flat_lower), np.abs(feedback.flat_upper))
+    magnitude = DelaySystem(np.abs(system.A0), tuple(map(np.abs, system.delayed)), system.delays)
+    return with_terms(magnitude, drive, measure, gains.reshape(lags.shape), lags)

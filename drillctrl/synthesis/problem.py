@@ -146,7 +146,8 @@ def reported_value(family: LoopFamily, objective: Objective, gains: FloatArray) 
     if isinstance(objective, SemiDiscrete):
         return semidiscretize(loop, objective.m, objective.order).growth_rate
     if isinstance(objective, Robust):
-        weights = measures.plant_weights(family).tolist()
+        matrices = family.system.A0, *map(family.system.delayed_matrix, loop.delays)
+        weights = [float(np.linalg.norm(matrix, 2)) for matrix in matrices]
         return pseudospectral_abscissa(loop, objective.epsilon, weights)
     return None
 

@@ -76,7 +76,7 @@ def test_padé_states_its_error_and_converges(loop):
 def test_a_plant_of_python_control_is_designed_for():
     """x'' = u with u = k x(t − τ) + d x'(t − τ): the double integrator with a late input."""
     plant = control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), 0, inputs=["force"])
-    system = from_control(plant, 0.2)
+    system = from_control(plant, feedback_delay=0.2)
     late = FeedbackStructure(
         "late",
         tuple(system.output_names),
