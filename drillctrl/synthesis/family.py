@@ -16,8 +16,11 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+from drillctrl.synthesis.boxes import bound_of_entries, largest_loop
 from drillctrl.synthesis.expansion import Expansion, expand
 
+# Gains that need more make the loop far faster than its plant; their loops are looked at again.
+_FINEST = 64
 _CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
 
 
@@ -274,7 +277,8 @@ def loop_family(
     plain = replace(plain, delays=delays, delayed=tuple(map(plain.delayed_matrix, delays)))
     if degree is None:
         # Three more than suffices to start an iteration on the characteristic equation.
-        degree = degree_for(_largest(system, feedback), 0.0) + 3
+        largest = largest_loop(system, feedback, bound_of_entries(feedback))
+        degree = min(degree_for(largest) + 3, max(_FINEST, degree_for(plain)))
     base = generator_matrix(plain, degree, [carried[delay] for delay in delays])
     size, n = base.shape[0], system.order
     # The oldest values of the signals of each delay.
@@ -302,12 +306,3 @@ def loop_family(
         lags,
         degree,
     )
-
-
-def _largest(system: DelaySystem, feedback: FeedbackStructure) -> DelaySystem:
-    """Return a loop whose matrices bound those of every loop in the family."""
-    drive, measure = (np.abs(channel) for channel in loop_channels(system, feedback))
-    lags = feedback_lags(system, feedback)
-    gains = np.maximum(np.abs(feedback.flat_lower), np.abs(feedback.flat_upper))
-    magnitude = DelaySystem(np.abs(system.A0), tuple(map(np.abs, system.delayed)), system.delays)
-    return with_terms(magnitude, drive, measure, gains.reshape(lags.shape), lags)

@@ -10,9 +10,10 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
+from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
-from drillctrl.synthesis.family import ActiveRoot, LoopFamily
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
@@ -113,13 +114,33 @@ def global_search(
     known : sequence of array, (k,)
         Gains that are good nearby; descents begin there too.
     """
-    lower, upper = family.feedback.lower, family.feedback.upper
-    count = lower.size
+    count = family.feedback.lower.size
     if count == 0:
-        value, _ = family.abscissa(lower)
-        only = Basin(lower, value, ())
+        value, _ = family.abscissa(family.feedback.lower)
+        only = Basin(family.feedback.lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
+    *inner, _ = nested_boxes(family.system, family.feedback) if effort.begun else [None]
+    basins, evaluations = [], 0
+    for feedback in inner:
+        found = _in_box(loop_family(family.system, feedback), seed, effort, known)
+        end = found.best.gains
+        if ((end <= feedback.lower) | (end >= feedback.upper)).any():
+            known = [*known, end]
+        basins += found.basins
+        evaluations += found.evaluations
+    search = _in_box(family, seed, effort, known)
+    if not inner:
+        return search
+    distinct = _distinct(sorted([*basins, *search.basins], key=lambda basin: basin.value))
+    tolerance = 1e-6 * (1.0 + abs(distinct[0].value))
+    hits = sum(basin.value <= distinct[0].value + tolerance for basin in [*basins, *search.basins])
+    return Search(distinct[0], distinct, hits, evaluations + search.evaluations)
+
+
+def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[FloatArray]) -> Search:
+    """Descend from many starts all over the box, and sharpen the ends."""
+    lower, upper = family.feedback.lower, family.feedback.upper
     starts = [np.clip(gains, lower, upper) for gains in known]
     evaluations = 0
     if effort.begun:

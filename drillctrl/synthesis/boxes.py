@@ -1,0 +1,99 @@
+"""Boxes of gains from those that matter beside the plant up to the bounds.
+
+Wide bounds say little of where the good gains lie, and gains that make the loop much faster
+than its plant need a fine collocation. So a wide box is searched from the inside out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.delay.closing import feedback_lags, loop_channels, with_terms
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum.characteristic import magnitude_bound
+
+# Gains of the innermost box make the loop at most this much faster than its plant, those of
+# each further box as much faster again as the second says.
+_FIRST, _FURTHER = 2.0, 4.0
+_HALVINGS = 30
+
+
+def fastest(system: DelaySystem, feedback: FeedbackStructure, entries: FloatArray) -> float:
+    """Bound the modulus of roots right of the axis, for entries of K1 and K2 up to some size.
+
+    Parameters
+    ----------
+    system, feedback : DelaySystem and FeedbackStructure
+        Plant and structure.
+    entries : array, (2 m p,)
+        Largest moduli of the entries of the gain matrices, flattened.
+    """
+    return magnitude_bound(largest_loop(system, feedback, entries), 0.0)
+
+
+def largest_loop(
+    system: DelaySystem, feedback: FeedbackStructure, entries: FloatArray
+) -> DelaySystem:
+    """Return a loop whose matrices bound those of every loop with such entries."""
+    drive, measure = (np.abs(channel) for channel in loop_channels(system, feedback))
+    lags = feedback_lags(system, feedback)
+    magnitude = DelaySystem(np.abs(system.A0), tuple(map(np.abs, system.delayed)), system.delays)
+    return with_terms(magnitude, drive, measure, entries.reshape(lags.shape), lags)
+
+
+def bound_of_entries(feedback: FeedbackStructure) -> FloatArray:
+    """Return the largest modulus of every entry of K1 and K2 within the bounds, (2 m p,)."""
+    return np.asarray(np.maximum(np.abs(feedback.flat_lower), np.abs(feedback.flat_upper)))
+
+
+def nested_boxes(system: DelaySystem, feedback: FeedbackStructure) -> list[FeedbackStructure]:
+    """Return the structure with bounds that widen, its own last.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        The plant.
+    feedback : FeedbackStructure
+        With free gains.
+
+    Returns
+    -------
+    list of FeedbackStructure
+        The structure alone where its bounds are not wide.
+    """
+    lags = [*system.delays, *feedback_lags(system, feedback).ravel().tolist()]
+    shortest = min((lag for lag in lags if lag), default=np.inf)
+    speed = _FIRST * max(magnitude_bound(system, 0.0), 1.0 / shortest)
+    reach = fastest(system, feedback, bound_of_entries(feedback))
+    boxes: list[FeedbackStructure] = []
+    while 0.0 < speed < reach:
+        scales = _scales(system, feedback, speed)
+        lower = np.clip(feedback.lower, -scales, scales)
+        upper = np.clip(feedback.upper, -scales, scales)
+        # Bounds that begin beyond are taken whole.
+        sides = zip(feedback.gain_names, lower.tolist(), upper.tolist(), strict=True)
+        box = feedback.with_bounds({n: (low, high) for n, low, high in sides if low < high})
+        last = boxes[-1] if boxes else None
+        if last is None or (box.lower < last.lower).any() or (box.upper > last.upper).any():
+            boxes.append(box)
+        speed *= _FURTHER
+    own = feedback.lower, feedback.upper
+    return [b for b in boxes if not np.array_equal((b.lower, b.upper), own)] + [feedback]
+
+
+def _scales(system: DelaySystem, feedback: FeedbackStructure, speed: float) -> FloatArray:
+    """Return the size up to which each gain alone makes the loop no faster than that, (k,)."""
+    spread = np.abs(feedback.spread)
+    low = np.zeros(spread.shape[1])
+    high = np.maximum(np.abs(feedback.lower), np.abs(feedback.upper))
+    for j in range(low.size):
+        if fastest(system, feedback, high[j] * spread[:, j]) <= speed:
+            low[j] = high[j]
+            continue
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low[j] + high[j])
+            quick = fastest(system, feedback, middle * spread[:, j]) > speed
+            low[j], high[j] = (low[j], middle) if quick else (middle, high[j])
+    return low
