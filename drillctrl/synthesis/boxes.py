@@ -68,13 +68,14 @@ def nested_boxes(system: DelaySystem, feedback: FeedbackStructure) -> list[Feedb
     speed = _FIRST * max(magnitude_bound(system, 0.0), 1.0 / shortest)
     reach = fastest(system, feedback, bound_of_entries(feedback))
     boxes: list[FeedbackStructure] = []
+    # The gains that do least.
+    centre = np.clip(0.0, feedback.lower, feedback.upper)
     while 0.0 < speed < reach:
         scales = _scales(system, feedback, speed)
-        lower = np.clip(feedback.lower, -scales, scales)
-        upper = np.clip(feedback.upper, -scales, scales)
-        # Bounds that begin beyond are taken whole.
+        lower = np.maximum(feedback.lower, centre - scales)
+        upper = np.minimum(feedback.upper, centre + scales)
         sides = zip(feedback.gain_names, lower.tolist(), upper.tolist(), strict=True)
-        box = feedback.with_bounds({n: (low, high) for n, low, high in sides if low < high})
+        box = feedback.with_bounds({name: (low, high) for name, low, high in sides})
         last = boxes[-1] if boxes else None
         if last is None or (box.lower < last.lower).any() or (box.upper > last.upper).any():
             boxes.append(box)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -16,6 +17,7 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis.boxes import bound_of_entries, largest_loop
 from drillctrl.synthesis.expansion import Expansion, expand
 
@@ -43,6 +45,25 @@ class ActiveRoot:
     def equations(self) -> int:
         """Number of real conditions."""
         return self.multiplicity * (1 if self.omega == 0.0 else 2)
+
+
+class RootFamily(Protocol):
+    """What is needed to sharpen gains on the roots that are rightmost."""
+
+    @property
+    def feedback(self) -> FeedbackStructure:
+        """Structure of the loops."""
+
+    def exact(self, gains: FloatArray) -> float:
+        """Return the real part of the rightmost root."""
+
+    def eigenvalues(self, gains: FloatArray) -> ComplexArray:
+        """Return approximate roots, rightmost first."""
+
+    def taylor(
+        self, s: ComplexArray, gains: FloatArray, terms: int
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Expand the characteristic function and its derivatives by the gains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +254,10 @@ class LoopFamily:
         drive = self.drive * (self.spread @ gains)
         fed_back = np.einsum("nk,qkm->qnm", drive, self.seen_at(s))
         return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
+
+    def exact(self, gains: FloatArray) -> float:
+        """Return the spectral abscissa of the delay system."""
+        return spectral_abscissa(self.loop(gains))
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""

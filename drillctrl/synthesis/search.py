@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
-from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily, RootFamily, loop_family
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
@@ -120,8 +119,9 @@ def global_search(
         only = Basin(family.feedback.lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
-    *inner, _ = nested_boxes(family.system, family.feedback) if effort.begun else [None]
-    basins, evaluations = [], 0
+    inner = nested_boxes(family.system, family.feedback)[:-1] if effort.begun else []
+    basins: list[Basin] = []
+    evaluations = 0
     for feedback in inner:
         found = _in_box(loop_family(family.system, feedback), seed, effort, known)
         end = found.best.gains
@@ -160,7 +160,7 @@ def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[Float
         seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
         if len(sharp) == effort.sharpened or seen:
             # Exact: near a multiple root the collocation promises more than there is.
-            exact = spectral_abscissa(family.loop(basin.gains))
+            exact = family.exact(basin.gains)
             rest.append(Basin(basin.gains, exact, ()))
             evaluations += 1
             continue
@@ -223,7 +223,7 @@ def _settle(family: LoopFamily, basin: Basin, effort: Effort) -> tuple[Basin, in
     return best, used
 
 
-def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
+def improve(family: RootFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
     """Sharpen an end on every configuration of active roots that its spectrum suggests.
 
     Each success is looked at again: roots that have become active join the configuration.
@@ -237,7 +237,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
     """
     # From here on abscissas are exact: the collocation's error is as large as what is gained.
     used = 1
-    best = Basin(basin.gains, spectral_abscissa(family.loop(basin.gains)), ())
+    best = Basin(basin.gains, family.exact(basin.gains), ())
     tried: set[tuple[tuple[bool, int], ...]] = set()
     for _ in range(rounds):
         values = family.eigenvalues(best.gains)
@@ -250,7 +250,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
                     continue
                 tried.add(key)
                 sharp = sharpen(family, best.gains, best.value, roots)
-                value = spectral_abscissa(family.loop(sharp.gains))
+                value = family.exact(sharp.gains)
                 used += sharp.evaluations + 1
                 converged = sharp.residual < 1e-9 and value < sharp.abscissa + _blur(roots)
                 if converged and sharp.abscissa < best.value - 1e-12:
@@ -278,7 +278,7 @@ def follow(family: LoopFamily, start: FloatArray, roots: tuple[ActiveRoot, ...])
     """
     lower, upper = family.feedback.lower, family.feedback.upper
     start = np.clip(start, lower, upper)
-    sharp = sharpen(family, start, spectral_abscissa(family.loop(start)), roots)
+    sharp = sharpen(family, start, family.exact(start), roots)
     if not _holds(family, sharp):
         return None
     return Basin(sharp.gains, sharp.abscissa, sharp.roots)
@@ -288,7 +288,7 @@ def _holds(family: LoopFamily, sharp: ActiveDesign) -> bool:
     """Whether the conditions are met and no other root lies further right."""
     if not sharp.residual < 1e-9:
         return False
-    value = spectral_abscissa(family.loop(sharp.gains))
+    value = family.exact(sharp.gains)
     return value < sharp.abscissa + _blur(sharp.roots)
 
 

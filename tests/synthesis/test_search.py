@@ -1,9 +1,13 @@
+import itertools
+
 import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
 from drillctrl import OperatingPoint, design, dominant_roots, plant_system, preset_structure
+from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.synthesis.active import sharpen
+from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.certificate import shortest_combination
 from drillctrl.synthesis.explicit import explicit_candidates
 from drillctrl.synthesis.family import ActiveRoot, loop_family
@@ -109,3 +113,36 @@ def test_certificate_tells_an_optimum_from_another_point(point_c):
     loops = loop_family(plant_system(point_c), preset_structure("p"))
     gradients, _ = loops.active_gradients(np.array([-1.0]))
     assert shortest_combination(gradients, []) > 1e-3
+
+
+def test_wider_bounds_never_give_worse_gains(point_c):
+    plant, structure = plant_system(point_c), preset_structure("p")
+    scan = -np.geomspace(1.0, 1e4, 600)
+    lowest = spectral_abscissas(plant, structure=structure, gains=scan[:, None]).min()
+    before = np.inf
+    for bound in (10.0, 1e3, 1e4, 1e6):
+        result = design(point_c, "p", bounds={"K1": (-bound, bound)}, trials=False)
+        assert result.spectral_abscissa <= before + 1e-9
+        before = result.spectral_abscissa
+    assert lowest - 1e-3 < before <= lowest
+    assert before == pytest.approx(-0.169953919, abs=1e-8)
+
+
+def test_wide_bounds_keep_the_optimum_of_narrow_ones(point_c):
+    narrow = design(point_c, "pd", trials=False)
+    wide = design(point_c, "pd", bounds={"K1": (-300.0, 300.0)}, trials=False)
+    assert wide.spectral_abscissa == pytest.approx(narrow.spectral_abscissa, abs=1e-9)
+    assert pytest.approx(narrow.K1, rel=1e-6) == wide.K1
+    assert wide.optimality.stationarity < 1e-6
+
+
+def test_boxes_widen_to_the_bounds(plant_c):
+    structure = preset_structure("pd").with_bounds({"K1": (-1e4, 1e3), "K1_2": (200.0, 1e4)})
+    boxes = nested_boxes(plant_c, structure)
+    assert len(boxes) > 2
+    assert boxes[-1] is structure
+    for inner, outer in itertools.pairwise(boxes):
+        assert (inner.lower >= outer.lower).all()
+        assert (inner.upper <= outer.upper).all()
+        assert (inner.lower < inner.upper).all()
+    assert len(nested_boxes(plant_c, preset_structure("case2"))) == 1
