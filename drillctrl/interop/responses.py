@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.extras import required
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
+
+# What is smaller is left out at high frequencies: gain margins are looked for up to its inverse.
+_SMALL = 1e-4
 
 if TYPE_CHECKING:
     import control
@@ -34,7 +38,13 @@ def to_frd(
     control = required("control", "control")
 
     grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
-    return control.frd(frequency_response(system, grid), grid, smooth=_is_siso(system))
+    return control.frd(
+        frequency_response(system, grid),
+        grid,
+        inputs=list(system.input_names),
+        outputs=list(system.output_names),
+        smooth=_is_siso(system),
+    )
 
 
 def loop_frd(
@@ -44,12 +54,27 @@ def loop_frd(
     K2: npt.ArrayLike | None = None,
     omega: npt.ArrayLike | None = None,
 ) -> control.FrequencyResponseData:
-    """Return `loop_transfer` as python-control data, ready for ``stability_margins``."""
+    """Return `loop_transfer` as python-control data, ready for ``stability_margins``.
+
+    Its signals are the inputs that the structure drives, as they act and as they are demanded.
+    """
     control = required("control", "control")
 
-    grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
-    data = loop_transfer(system, structure, K1, K2, grid)
-    return control.frd(data, grid, smooth=data.shape[0] == 1)
+    def transfer(points: FloatArray) -> ComplexArray:
+        return loop_transfer(system, structure, K1, K2, points)
+
+    if omega is None:
+        grid = frequency_grid(system, response=transfer, small=_SMALL)
+    else:
+        grid = np.asarray(omega, dtype=float)
+    names = list(structure.inputs)
+    return control.frd(
+        transfer(grid),
+        grid,
+        inputs=names,
+        outputs=[f"{name}_demanded" for name in names],
+        smooth=len(names) == 1,
+    )
 
 
 def _is_siso(system: DelaySystem) -> bool:

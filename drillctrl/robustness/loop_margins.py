@@ -14,6 +14,8 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 
+# Gain margins beyond its inverse are infinite.
+_SMALL = 1e-4
 Transfer = Callable[[FloatArray], ComplexArray]
 
 
@@ -60,7 +62,8 @@ def loop_margins(
         data = loop_transfer(plant, structure, K1, K2, omega)
         return np.asarray(data[0, 0])
 
-    omega = frequency_grid(close_loop(plant, structure, K1, K2))
+    closed = close_loop(plant, structure, K1, K2)
+    omega = frequency_grid(closed, response=transfer, small=_SMALL)
     loop = transfer(omega)
     crossings = _bisected(lambda w: transfer(w).imag, omega, loop.imag)
     real = transfer(crossings).real if crossings.size else np.zeros(0)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,7 +15,10 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 
-_COARSEST = 0.02
+# Change of phase and size of det Δ, and relative change of what is drawn, between neighbours.
+_COARSEST, _TURN = 0.02, 0.05
+# How far the ends are moved.
+_DECADES = 12
 _MAX_POINTS = 20_000
 # Entries of matrices that are held at once.
 _AT_ONCE = 100_000
@@ -31,14 +37,14 @@ def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArra
     Returns
     -------
     array, (p, m, q)
-        Outputs by inputs by frequencies.
+        Outputs by inputs by frequencies; infinite at a pole.
     """
     points = np.atleast_1d(np.asarray(omega, dtype=float))
     if not np.isfinite(points).all():
         raise InputError("omega", "an array with NaN or infinity", "finite")
-    response = np.moveaxis(system.C @ _responses(system, system.B, points), 0, -1)
     lags = np.add.outer(system.output_delays, system.input_delays)
-    return np.asarray(response * np.exp(-1j * np.multiply.outer(lags, points)))
+    turned = np.exp(-1j * np.multiply.outer(points, lags))
+    return _by_frequency(turned * (system.C @ _responses(system, system.B, points)))
 
 
 def loop_transfer(
@@ -72,19 +78,29 @@ def loop_transfer(
     points = np.atleast_1d(np.asarray(omega, dtype=float))
     turned = np.exp(-1j * np.multiply.outer(points, feedback_lags(system, structure)))
     transfer = -(gains * turned).sum(axis=1) @ measure @ _responses(system, drive, points)
-    return np.asarray(np.moveaxis(transfer, 0, -1))
+    return _by_frequency(transfer)
 
 
 def _responses(system: DelaySystem, drive: FloatArray, omega: FloatArray) -> ComplexArray:
     """Return Δ(iω)⁻¹ B for every ω, (q, n, m), without holding all Δ at once."""
-    found = [
-        np.linalg.solve(
-            characteristic.matrix(system, 1j * some),
-            np.broadcast_to(drive.astype(complex), (some.size, *drive.shape)),
-        )
-        for some in _portions(system, omega)
-    ]
+    found = []
+    for some in _portions(system, omega):
+        delta = characteristic.matrix(system, 1j * some)
+        right = np.broadcast_to(drive.astype(complex), (some.size, *drive.shape))
+        try:
+            found.append(np.linalg.solve(delta, right))
+        except np.linalg.LinAlgError:
+            poles = np.linalg.svd(delta, compute_uv=False)[:, -1] == 0.0
+            poles |= np.linalg.det(delta) == 0.0
+            delta[poles] = np.eye(system.order)
+            found.append(np.where(poles[:, None, None], np.nan, np.linalg.solve(delta, right)))
     return np.concatenate(found)
+
+
+def _by_frequency(transfer: ComplexArray) -> ComplexArray:
+    """Move frequencies last; what has a pole there is infinite, as in python-control."""
+    transfer[np.isnan(transfer).any(axis=(1, 2))] = np.inf
+    return np.asarray(np.moveaxis(transfer, 0, -1))
 
 
 def _portions(system: DelaySystem, omega: FloatArray) -> list[FloatArray]:
@@ -92,37 +108,106 @@ def _portions(system: DelaySystem, omega: FloatArray) -> list[FloatArray]:
 
 
 def frequency_grid(
-    system: DelaySystem, low: float | None = None, high: float | None = None
+    system: DelaySystem,
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    response: Callable[[FloatArray], ComplexArray] | None = None,
+    small: float | None = None,
 ) -> FloatArray:
-    """Return frequencies dense enough that G turns little from one to the next.
+    """Return frequencies dense enough that a response changes little from one to the next.
 
     Parameters
     ----------
     system : DelaySystem
         Whose peaks are to be resolved.
     low, high : float, optional
-        Ends; by default far below and above all that the system does.
+        Ends; by default from where the response only follows a power of ω to where it is small,
+        and where the phase of each late channel has turned once.
+    response : callable, optional
+        (q,) → (..., q), what is drawn; G of the system by default, L for margins.
+    small : float, optional
+        What may be left out at high frequencies; by default 1e-3 of the largest.
     """
+    drawn = response
+    if drawn is None:
+        drawn = functools.partial(frequency_response, system)
     scale = characteristic.magnitude_bound(system, 0.0)
-    low = 1e-3 * min(scale, 1.0) if low is None else low
-    high = 10.0 * scale if high is None else high
+    low = _power_law_below(drawn, 1e-3 * min(scale or 1.0, 1.0)) if low is None else low
+    high = (
+        _small_beyond(system, drawn, max(10.0 * scale, 10.0 * low), small) if high is None else high
+    )
     if not 0.0 < low < high or not np.isfinite(high):
         raise InputError("low, high", (low, high), "positive, finite and increasing")
+
+    def looked(omega: FloatArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+        values = np.asarray(drawn(omega)).reshape(-1, omega.size)
+        return values, *_log_determinant(system, omega)
+
     omega = np.geomspace(low, high, 400)
-    sign, size = _log_determinant(system, omega)
+    values, sign, size = looked(omega)
     while omega.size < _MAX_POINTS:
         change = np.abs(np.diff(np.log(sign)).imag) % (2 * np.pi)
         change = np.minimum(change, 2 * np.pi - change) + np.abs(np.diff(size))
-        smooth = np.abs(np.diff(np.log(omega))) * system.order
-        coarse = np.flatnonzero(change > np.maximum(_COARSEST, 0.2 * smooth))
-        coarse = coarse[np.diff(np.log(omega))[coarse] > 1e-5]
+        smooth = np.abs(np.diff(np.log(omega)))
+        change = change / np.maximum(_COARSEST, 0.2 * smooth * system.order)
+        modulus = np.abs(values)
+        larger = np.maximum(modulus[:, 1:], modulus[:, :-1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turned = np.abs(np.diff(values)) / larger
+        # Little is seen of what is far smaller than the rest.
+        whole = modulus.max(initial=0.0) if small is None else 1e3 * small
+        turned *= np.minimum(larger / (whole or 1.0), 1.0) ** 0.35 * (larger > 1e-6 * whole) / _TURN
+        change = np.maximum(change, np.nan_to_num(turned).max(axis=0, initial=0.0))
+        change[smooth <= 1e-5] = 0.0
+        coarse = np.flatnonzero(change > 1.0)
         if coarse.size == 0:
             break
+        # Where there are too many, those that are largest.
+        first = np.argsort(-larger[:, coarse].max(axis=0, initial=0.0), kind="stable")
+        coarse = np.sort(coarse[first[: _MAX_POINTS - omega.size]])
         middle = np.sqrt(omega[coarse] * omega[coarse + 1])
-        signs, sizes = _log_determinant(system, middle)
+        new = looked(middle)
         omega = np.insert(omega, coarse + 1, middle)
-        sign, size = np.insert(sign, coarse + 1, signs), np.insert(size, coarse + 1, sizes)
+        values, sign, size = (
+            np.insert(old, coarse + 1, more, axis=-1)
+            for old, more in zip((values, sign, size), new, strict=True)
+        )
     return omega
+
+
+def _power_law_below(response: Callable[[FloatArray], ComplexArray], low: float) -> float:
+    """Return a frequency below which a response is a power of ω, as far as decades show."""
+    for _ in range(_DECADES):
+        values = np.asarray(response(low * np.array([1.0, 0.1, 0.01]))).reshape(-1, 3)
+        if not np.isfinite(values).all():
+            break
+        bent = np.abs(values[:, 0] * values[:, 2] - values[:, 1] ** 2)
+        if (bent <= 1e-2 * np.abs(values[:, 1]) ** 2).all():
+            break
+        low *= 0.1
+    return low
+
+
+def _small_beyond(
+    system: DelaySystem,
+    response: Callable[[FloatArray], ComplexArray],
+    high: float,
+    small: float | None,
+) -> float:
+    """Return a frequency beyond which a response is small and all late channels have turned."""
+    lags = [lag for lag in (*system.input_delays, *system.output_delays) if lag]
+    lags += [system.feedback_delay] if system.feedback_delay else []
+    if lags:
+        high = max(high, 2.0 * np.pi / min(lags))
+    seen = np.abs(np.asarray(response(np.geomspace(1e-6 * high, high, 200)))).reshape(-1, 200)
+    limit = 1e-3 * float(seen.max(initial=0.0)) if small is None else small
+    for _ in range(4 * _DECADES):
+        ahead = np.abs(np.asarray(response(high * np.array([0.8, 0.9, 1.0])))).max(initial=0.0)
+        if ahead <= limit:
+            break
+        high *= 2.0
+    return high
 
 
 def _log_determinant(system: DelaySystem, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:

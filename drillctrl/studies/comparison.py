@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
 from drillctrl.designs.result import Analysis
@@ -300,6 +300,9 @@ class Comparison:
 def _loop(design: Analysis) -> ComplexArray:
     """Return L(iω) of a loop with one input, over frequencies that resolve it."""
     assert design.structure is not None
-    omega = frequency_grid(design.system())
-    data = loop_transfer(design.plant, design.structure, design.K1, design.K2, omega)
-    return np.asarray(data[0, 0])
+    structure, K1, K2 = design.structure, design.K1, design.K2
+
+    def transfer(omega: FloatArray) -> ComplexArray:
+        return np.asarray(loop_transfer(design.plant, structure, K1, K2, omega)[0, 0])
+
+    return transfer(frequency_grid(design.system(), response=transfer))

@@ -1,15 +1,20 @@
 import control
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from drillctrl import (
     DelaySystem,
+    FeedbackStructure,
     InputError,
     close_loop,
+    from_control,
     preset_structure,
     spectral_abscissa,
 )
+from drillctrl.delay.closing import gain_matrices
 from drillctrl.interop.responses import loop_frd, to_frd
+from drillctrl.robustness.loop_margins import loop_margins
 from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
 from drillctrl.spectrum import characteristic
 
@@ -108,3 +113,57 @@ def test_bad_frequencies_are_refused(plant_c):
         frequency_response(plant_c, [1.0, np.nan])
     with pytest.raises(InputError, match="low, high"):
         frequency_grid(plant_c, 2.0, 1.0)
+
+
+ONE = np.ones((1, 1))
+
+
+@pytest.mark.parametrize("late", ["input", "feedback"])
+def test_margins_of_a_lag_with_dead_time_are_the_closed_forms(late):
+    """100 exp(−0.001 s)/(s + 0.1) with unit feedback."""
+    lag = control.ss([[-0.1]], [[100.0]], [[1.0]], 0, inputs=["valve"], outputs=["level"])
+    bounds = -ONE, ONE, -ONE, ONE
+    structure = FeedbackStructure("unit", ("level",), *bounds, inputs=("valve",))
+    plant = from_control(lag, **{f"{late}_delay": 0.001})
+    gains = ([-1.0], None) if late == "input" else ([0.0], [-1.0])
+    # arg L = −arctan(10 ω) − 0.001 ω, |L| = 100/√(ω² + 0.01).
+    turn = brentq(lambda w: np.arctan(10 * w) + 0.001 * w - np.pi, 100.0, 3000.0)
+    gain = np.hypot(turn, 0.1) / 100.0
+    unit = np.sqrt(1e4 - 0.01)
+    phase = 180.0 - np.degrees(np.arctan(10 * unit) + 0.001 * unit)
+    assert (gain, phase) == (pytest.approx(15.7086, abs=1e-4), pytest.approx(84.3277, abs=1e-4))
+    loop = loop_frd(plant, structure, *gains)
+    found = control.stability_margins(loop)
+    assert found[0] == pytest.approx(gain, rel=1e-6)
+    assert found[1] == pytest.approx(phase, rel=1e-6)
+    assert (loop.input_labels, loop.output_labels) == (["valve"], ["valve_demanded"])
+    K1, K2 = gain_matrices(structure, *gains)
+    margins = loop_margins(plant, structure, K1, K2)
+    assert margins.gain_up == pytest.approx(gain, rel=1e-9)
+    assert margins.phase == pytest.approx(phase, rel=1e-9)
+
+
+def test_what_is_drawn_is_resolved_and_keeps_its_names():
+    plant = control.ss([[-1.0]], [[1.0]], [[1.0]], 0, inputs=["valve"], outputs=["level"])
+    drawn = to_frd(from_control(plant, 2.0))
+    assert (drawn.input_labels, drawn.output_labels) == (["valve"], ["level"])
+    exact = np.exp(-2j * drawn.omega) / (1j * drawn.omega + 1.0)
+    assert drawn.frdata[0, 0] == pytest.approx(exact, rel=1e-12)
+    assert drawn.omega[0] < 1e-2
+    assert np.abs(exact[-1]) < 1e-3
+    steps = np.abs(np.diff(exact)) / np.abs(exact[1:])
+    large = np.abs(exact[1:]) > 0.5
+    assert steps[large].max() < 0.06 < steps.max() < 0.6
+
+
+def test_a_slow_pole_is_seen():
+    slow = from_control(control.ss([[-1e-5]], [[1.0]], [[1.0]], 0), 0.1)
+    omega = frequency_grid(slow)
+    assert np.abs(frequency_response(slow, omega[:1])) == pytest.approx(1e5, rel=1e-2)
+
+
+def test_a_pole_on_the_axis_is_infinite():
+    double = from_control(control.ss([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], np.eye(2), 0), 0.3)
+    response = frequency_response(double, [0.0, 2.0])
+    assert np.isinf(response[:, :, 0]).all()
+    assert response[0, 0, 1] == pytest.approx(-np.exp(-0.6j) / 4.0, rel=1e-14)
