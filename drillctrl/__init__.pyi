@@ -76,6 +76,8 @@ from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
 from .robustness.margins import delay_margin as delay_margin
 from .robustness.margins import parameter_margin as parameter_margin
+from .robustness.norm import PeakGain as PeakGain
+from .robustness.norm import h_infinity_norm as h_infinity_norm
 from .robustness.radius import pseudospectral_abscissa as pseudospectral_abscissa
 from .robustness.radius import real_stability_radius as real_stability_radius
 from .robustness.radius import stability_radius as stability_radius
@@ -127,6 +129,7 @@ from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
 from .synthesis.objectives import Exact as Exact
+from .synthesis.objectives import HInfinity as HInfinity
 from .synthesis.objectives import Requirements as Requirements
 from .synthesis.objectives import Robust as Robust
 from .synthesis.objectives import SemiDiscrete as SemiDiscrete

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -127,6 +128,29 @@ def feedback_lags(
     return np.asarray(np.add.outer([0.0, late], np.add.outer(acts, seen)), dtype=float)
 
 
+def with_channels(
+    system: DelaySystem, inputs: Sequence[str] = (), outputs: Sequence[str] = ()
+) -> DelaySystem:
+    """Return the system with some of its inputs and outputs; all where none are named.
+
+    Raises
+    ------
+    InputError
+        If there is no such input or output.
+    """
+    columns = _indices(system.input_names, inputs or system.input_names, "input")
+    rows = _indices(system.output_names, outputs or system.output_names, "output")
+    return replace(
+        system,
+        B=system.B[:, columns],
+        C=system.C[rows],
+        input_names=tuple(system.input_names[i] for i in columns),
+        output_names=tuple(system.output_names[i] for i in rows),
+        input_delays=tuple(system.input_delays[i] for i in columns),
+        output_delays=tuple(system.output_delays[i] for i in rows),
+    )
+
+
 def loop_channels(
     system: DelaySystem, feedback: FeedbackStructure
 ) -> tuple[FloatArray, FloatArray]:
@@ -137,12 +161,12 @@ def loop_channels(
     InputError
         If the plant has no such input or output.
     """
-    for name in feedback.inputs:
-        if name not in system.input_names:
-            raise InputError("input", name, f"one of {', '.join(system.input_names)}")
-    for name in feedback.outputs:
-        if name not in system.output_names:
-            raise InputError("output", name, f"one of {', '.join(system.output_names)}")
-    columns = [system.input_names.index(name) for name in feedback.inputs]
-    rows = [system.output_names.index(name) for name in feedback.outputs]
-    return system.B[:, columns], system.C[rows]
+    columns = _indices(system.input_names, feedback.inputs, "input")
+    return system.B[:, columns], system.C[_indices(system.output_names, feedback.outputs, "output")]
+
+
+def _indices(names: Sequence[str], wanted: Sequence[str], kind: str) -> list[int]:
+    for name in wanted:
+        if name not in names:
+            raise InputError(kind, name, f"one of {', '.join(names)}")
+    return [names.index(name) for name in wanted]

@@ -45,7 +45,7 @@ def design(
         A preset (``"p"``, ``"case1"``, ``"pd"``, ``"case2"``) or a structure.
     bounds : mapping, optional
         Bounds that replace those of the structure; see `FeedbackStructure.with_bounds`.
-    objective : Exact, SemiDiscrete, WorstCase or Robust
+    objective : Exact, SemiDiscrete, WorstCase, Robust or HInfinity
         What to minimise instead of the spectral abscissa.
     requirements : Requirements
         What must hold beside the bounds.
@@ -100,12 +100,13 @@ def _meets(
     result: Analysis, requirements: Requirements, family: LoopFamily, gains: FloatArray
 ) -> bool:
     """Whether a design fulfils what was required, by exact abscissa and guaranteed radius."""
-    wanted = requirements.decay, requirements.stability_radius, requirements.input_gain
-    decay, radius, peak = wanted
+    decay, radius = requirements.decay, requirements.stability_radius
+    peak, norm = requirements.input_gain, requirements.h_infinity
     return (
         (decay is None or result.spectral_abscissa + result.loop.abscissa_error <= -decay)
         and (radius is None or relative_radius(result).value >= radius)
         and (peak is None or (result.stable and problem.input_gain(family, gains) <= peak))
+        and (norm is None or problem.norm_between(family, requirements.between, gains) <= norm)
     )
 
 

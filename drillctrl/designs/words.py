@@ -13,7 +13,7 @@ from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.steady import steady_state
 from drillctrl.simulation.outcome import Figures
 from drillctrl.simulation.status import Outcome
-from drillctrl.synthesis.objectives import Robust, SemiDiscrete
+from drillctrl.synthesis.objectives import HInfinity, Robust, SemiDiscrete
 
 Lines = list[tuple[str, str]]
 
@@ -215,6 +215,9 @@ def _objective_lines(design: DesignValues) -> Lines:
             goal = f"largest α of {len(case.around(design.point))} points"
         case Robust(epsilon=epsilon):
             goal = f"largest Re s with relative errors of the plant up to {epsilon:g}"
+        case HInfinity(inputs=inputs, outputs=outputs):
+            ends = (", ".join(names) or "all" for names in (inputs, outputs))
+            goal = "H∞ norm from {} to {}".format(*ends)
         case _:
             goal = ""
     if goal:
@@ -224,6 +227,7 @@ def _objective_lines(design: DesignValues) -> Lines:
             ("decay rate ≥ {:g}", design.requirements.decay),
             ("stability radius ≥ {:g}", design.requirements.stability_radius),
             ("input gain ≤ {:g}", design.requirements.input_gain),
+            ("H∞ norm ≤ {:g}", design.requirements.h_infinity),
         )
         text = ", ".join(form.format(value) for form, value in wanted if value is not None)
         lines.append(("Required", f"{text}: {'met' if design.requirements_met else 'NOT MET'}"))

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.optimize
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.delay.closing import close_loop, loop_channels
+from drillctrl.delay.closing import close_loop, loop_channels, with_channels
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.semidiscretization import SemiDiscretization, semidiscretize
 from drillctrl.synthesis.descent import Objective
@@ -251,5 +251,45 @@ def inverse_input_gain(family: LoopFamily) -> Objective:
         out = p[:, 0].conj() @ (np.eye(t.shape[0]) + t) @ target
         entries = (out * (seen @ qh[0].conj())).real
         return value, -(value**2) * np.asarray(entries @ family.spread)
+
+    return objective
+
+
+def inverse_norm(family: LoopFamily, inputs: Sequence[str], outputs: Sequence[str]) -> Objective:
+    """Return 1 / max over ω of ‖C Δ⁻¹ B‖, continued by −α where the loop is unstable.
+
+    Parameters
+    ----------
+    family : LoopFamily
+        Loops to choose from.
+    inputs, outputs : sequence of str
+        Between which the gain is taken; all where none are named.
+    """
+    chosen = with_channels(family.system, inputs, outputs)
+
+    def response(s: ComplexArray, gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return Δ⁻¹ B and C Δ⁻¹."""
+        inverse = np.linalg.inv(family.characteristic_matrix(s, gains))
+        return np.asarray(inverse @ chosen.B), np.asarray(chosen.C @ inverse)
+
+    def objective(gains: FloatArray) -> tuple[float, FloatArray]:
+        alpha, slope = family.abscissa(gains)
+        if alpha >= 0.0:
+            return -alpha, -slope
+
+        def inverse(points: FloatArray) -> FloatArray:
+            gain = chosen.C @ response(np.asarray(1j * points), gains)[0]
+            return np.asarray(1.0 / np.maximum(np.linalg.norm(gain, 2, axis=(1, 2)), 1e-9))
+
+        where, value = _lowest(inverse, _frequencies(family, gains, 0.0))
+        s = np.array([1j * where])
+        driven, seen = (part[0] for part in response(s, gains))
+        p, size, qh = np.linalg.svd(chosen.C @ driven)
+        if size[0] <= 1e-9:
+            return value, np.zeros(gains.size)
+        entries = (p[:, 0].conj() @ seen @ family.drive) * (
+            family.seen_at(s)[0] @ driven @ qh[0].conj()
+        )
+        return value, -(value**2) * np.asarray(entries.real @ family.spread)
 
     return objective

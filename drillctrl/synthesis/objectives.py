@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from drillctrl.base.errors import checked_integer, checked_number
 
+_LIMITS = ("decay", "stability_radius", "input_gain", "h_infinity")
+
 
 @dataclass(frozen=True)
 class Exact:
@@ -59,7 +61,23 @@ class WorstLoop:
     name = "worst-case"
 
 
-Objective = Exact | SemiDiscrete | WorstLoop | Robust
+@dataclass(frozen=True)
+class HInfinity:
+    """The H∞ norm: the largest gain over all frequencies from some inputs to some outputs.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+        Of the closed loop, by name, those that the structure drives among the inputs; all of
+        them where none are named. Outputs of several units add up as numbers: name those of one.
+    """
+
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    name = "h-infinity"
+
+
+Objective = Exact | SemiDiscrete | WorstLoop | Robust | HInfinity
 
 
 @dataclass(frozen=True)
@@ -76,20 +94,26 @@ class Requirements:
         The peak over all frequencies of the gain from a disturbance beside the input to
         the input that feedback demands must not be more: what a disturbance torque of
         amplitude 1 costs in control torque.
+    h_infinity : float or None
+        The H∞ norm must not be more.
+    between : HInfinity
+        Between which inputs and outputs it is taken.
     """
 
     decay: float | None = None
     stability_radius: float | None = None
     input_gain: float | None = None
+    h_infinity: float | None = None
+    between: HInfinity = HInfinity()
 
     def __post_init__(self) -> None:
-        for name in ("decay", "stability_radius", "input_gain"):
+        for name in _LIMITS:
             value = getattr(self, name)
             if value is not None:
                 checked_number(name, value, 0.0, 1e6, open_low=True)
 
     def __bool__(self) -> bool:
-        return any(v is not None for v in (self.decay, self.stability_radius, self.input_gain))
+        return any(getattr(self, name) is not None for name in _LIMITS)
 
 
 EXACT = Exact()

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.delay.closing import with_channels
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.robustness.norm import h_infinity_norm
 from drillctrl.robustness.radius import pseudospectral_abscissa
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 from drillctrl.spectrum.semidiscretization import semidiscretize
@@ -19,6 +21,7 @@ from drillctrl.synthesis.constrained import certify_sampled, constrained_search
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import (
     Exact,
+    HInfinity,
     Objective,
     Requirements,
     Robust,
@@ -149,7 +152,15 @@ def reported_value(family: LoopFamily, objective: Objective, gains: FloatArray) 
         matrices = family.system.A0, *map(family.system.delayed_matrix, loop.delays)
         weights = [float(np.linalg.norm(matrix, 2)) for matrix in matrices]
         return pseudospectral_abscissa(loop, objective.epsilon, weights)
+    if isinstance(objective, HInfinity):
+        return norm_between(family, objective, gains)
     return None
+
+
+def norm_between(family: LoopFamily, between: HInfinity, gains: FloatArray) -> float:
+    """Return the H∞ norm of a loop, infinite for an unstable one."""
+    chosen = with_channels(family.loop(gains), between.inputs, between.outputs)
+    return h_infinity_norm(chosen).value
 
 
 def input_gain(family: LoopFamily, gains: FloatArray) -> float:
@@ -172,7 +183,17 @@ def _goal(
         return measures.worst_case([family, *others])
     if isinstance(objective, Robust):
         return measures.pseudospectral(family, objective.epsilon)
+    if isinstance(objective, HInfinity):
+        return _negative(measures.inverse_norm(family, objective.inputs, objective.outputs))
     return family.abscissa
+
+
+def _negative(measure: descent.Objective) -> descent.Objective:
+    def negated(gains: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = measure(gains)
+        return -value, -gradient
+
+    return negated
 
 
 def _at_least(measure: descent.Objective, wanted: float) -> descent.Objective:
@@ -185,20 +206,19 @@ def _at_least(measure: descent.Objective, wanted: float) -> descent.Objective:
 
 def _excesses(family: LoopFamily, requirements: Requirements) -> list[descent.Objective]:
     """Return what must not be positive: each shortfall relative to what is required."""
+
+    def norm(loops: LoopFamily) -> descent.Objective:
+        between = requirements.between
+        return measures.inverse_norm(loops, between.inputs, between.outputs)
+
     pairs: list[tuple[float | None, Callable[[LoopFamily], descent.Objective]]] = [
-        (requirements.decay, _decay),
+        (requirements.decay, lambda loops: _negative(loops.abscissa)),
         (requirements.stability_radius, measures.distance),
-        (
-            None if requirements.input_gain is None else 1.0 / requirements.input_gain,
-            measures.inverse_input_gain,
-        ),
+        (_inverse(requirements.input_gain), measures.inverse_input_gain),
+        (_inverse(requirements.h_infinity), norm),
     ]
     return [_at_least(measure(family), wanted) for wanted, measure in pairs if wanted is not None]
 
 
-def _decay(family: LoopFamily) -> descent.Objective:
-    def rate(gains: FloatArray) -> tuple[float, FloatArray]:
-        value, gradient = family.abscissa(gains)
-        return -value, -np.asarray(gradient)
-
-    return rate
+def _inverse(limit: float | None) -> float | None:
+    return None if limit is None else 1.0 / limit

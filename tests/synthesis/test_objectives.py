@@ -40,6 +40,7 @@ GAINS = {"case1": [-5.17, 5.06], "case2": [-5.03, -1.91, -1.67, -0.31]}
         measures.distance,
         lambda f: measures.pseudospectral(f, 1e-3),
         measures.inverse_input_gain,
+        lambda f: measures.inverse_norm(f, (), ("theta",)),
     ],
 )
 def test_gradients_of_measures_are_those_of_differences(point_c, name, measure):
