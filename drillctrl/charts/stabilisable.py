@@ -12,24 +12,26 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.chart import chart
+from drillctrl.charts.decisions import Place, Searched, by_curves, has_curves
 from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import first_position
-from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
-from drillctrl.charts.sweep import sweep
+from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, Decision, scan_stabilisable
+from drillctrl.charts.sweep import Sweep, sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
 from drillctrl.drilling.structures import as_structure
-from drillctrl.synthesis.gain_margin import check_gains
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from drillctrl.charts.chart import StabilityChart
 
-_NARROWEST = 3e-3
+# Share of x by which lines are apart at least: those that need a search cost more.
+_NARROWEST, _NARROWEST_SEARCHED = 3e-3, 1.5e-2
+_COARSER = 5.0
 # Roots of loops with longer delays crowd the axis, and gains that tame them are not looked for.
-_LONGEST_DELAY = 2.1
+_LONGEST_DELAY = 6.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +53,13 @@ class StabilisableChart:
         In units of x times y, and an estimate of the error that lines, crossings and
         panels leave; islands that no sample met are not in it.
     undecided_area : float
-        Of the strip at low rotary speed that is not looked at: there the delay exceeds 2.1.
+        Of the strip at low rotary speed that is not looked at: there the delay exceeds 6.3.
     lines : tuple of ScanLine
         The scanned lines of constant x.
     open_loop : StabilityChart
         The same axes without feedback.
+    places : tuple of Place
+        Where gains were searched for, with those found; empty where explicit curves decide.
     samples : int
         Places looked at on each line before refinement.
     elapsed_seconds : float
@@ -71,6 +75,7 @@ class StabilisableChart:
     undecided_area: float
     lines: tuple[ScanLine, ...]
     open_loop: StabilityChart
+    places: tuple[Place, ...]
     samples: int
     elapsed_seconds: float
 
@@ -95,10 +100,10 @@ class StabilisableChart:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
-        structure = self.structure
+        structure, plane = self.structure, self.plane
         return {
             "schema": "drillctrl/chart/1",
-            **plane_fields(self.plane),
+            **plane_fields(plane),
             "structure": structure.name,
             "K1": None,
             "K2": None,
@@ -122,7 +127,18 @@ class StabilisableChart:
             "area_ratio_error": self.area_ratio_error,
             "boundaries": [curve.points.tolist() for curve in self.curves],
             "boundary_details": [curve_fields(curve) for curve in self.curves],
-            "method": "gain curves",
+            "method": "search and count" if self.places else "gain curves",
+            "places": [
+                {
+                    plane.x.name: place.x,
+                    plane.y.name: place.y,
+                    "gains": place.gains.tolist(),
+                    "spectral_abscissa": self.level + place.margin,
+                    "stable": place.stable,
+                    "decided_by": "count" if place.stable else "search",
+                }
+                for place in self.places
+            ],
             "samples": self.samples,
             "elapsed_seconds": self.elapsed_seconds,
         }
@@ -151,12 +167,19 @@ class StabilisableChart:
         if self.undecided_area > 0.0:
             lines.append(
                 f"  undecided {self.undecided_area:.4g} at the lowest rotary speeds, "
-                "where the delay exceeds 2.1"
+                f"where the delay exceeds {_LONGEST_DELAY:g}"
             )
         lines.append(
             f"  sampled   {len(self.lines)} lines, {self.samples} places each before refinement; "
             "smaller islands may be missed"
         )
+        if self.places:
+            stable = sum(place.stable for place in self.places)
+            lines.append(
+                f"  proved    at {stable} places by gains and a count of roots; at "
+                f"{len(self.places) - stable} others gains were searched for and not found, "
+                "which is no proof: the area is a lower bound"
+            )
         return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -195,7 +218,7 @@ def stabilisable_chart(
     x, y : (name, low, high)
         As for `chart`, but no gains.
     structure : str or FeedbackStructure
-        With one or two free gains that drive one input; its bounds are those of the search.
+        With at least one free gain; its bounds are those of the search.
     level : float
         σ.
     tolerance : float
@@ -215,13 +238,16 @@ def stabilisable_chart(
 
     Notes
     -----
-    Whether gains exist at a place is decided on the explicit curves of gains that hold a
-    root at the line (see `drillctrl.synthesis.gain_margin`), not by a search over gains.
+    Whether one or two gains exist at a place is decided on the explicit curves of gains that
+    hold a root at the line (see `drillctrl.synthesis.gain_margin`). More gains are searched for,
+    from those of places nearby: where they are found a count of roots proves it, where they are
+    not the search may have missed them, so that the area is a lower bound.
     """
     began = time.perf_counter()
     plane = make_plane(point, x, y, None, None, None)
     chosen = as_structure(structure)
-    check_gains(chosen.lower.size)
+    if not chosen.lower.size:
+        raise InputError("structure", chosen.name, "one with free gains")
     checked_number("level", level, -100.0, 100.0)
     checked_number("tolerance", tolerance, 1e-6, 0.1)
     checked_integer("first_lines", first_lines, 3, 1000)
@@ -235,17 +261,29 @@ def stabilisable_chart(
             progress(done)
 
     start, low = _shortest_speed(plane, plane.x), _shortest_speed(plane, plane.y)
-    result = sweep(
-        lambda positions: scan_stabilisable(
-            plane, chosen, positions, level=level, samples=samples, low=low, progress=count
-        ),
-        start,
-        plane.x.high,
-        tolerance=tolerance,
-        first=first_lines,
-        narrowest=_NARROWEST,
-        inset=0.0,
-    )
+    searched = Searched(plane, chosen, level)
+    here = plane.case_at(plane.x.high, plane.y.high).system(chosen.inputs)
+    curves = has_curves(here, chosen)
+
+    def swept(decide: Decision, wanted: float) -> Sweep:
+        return sweep(
+            lambda positions: scan_stabilisable(
+                decide, positions, low, plane.y.high, samples=samples, progress=count
+            ),
+            start,
+            plane.x.high,
+            tolerance=wanted,
+            first=first_lines,
+            narrowest=_NARROWEST if curves else _NARROWEST_SEARCHED,
+            inset=0.0,
+        )
+
+    if curves:
+        result = swept(by_curves(plane, chosen, level), tolerance)
+    else:
+        # Once to know gains all over the chart, and again from the gains of lines on both sides.
+        swept(searched, _COARSER * tolerance)
+        result = swept(searched.nearby, tolerance)
     # Every line carries two crossings or so, each within the tolerance of its root finder.
     most = max((line.at.size for line in result.lines), default=0)
     crossing = most * CROSSING_TOLERANCE * plane.y.span * plane.x.span
@@ -259,6 +297,7 @@ def stabilisable_chart(
         (start - plane.x.low) * plane.y.span + (low - plane.y.low) * plane.x.span,
         result.lines,
         chart(point, x, y, level=level),
+        tuple(searched.places),
         samples,
         time.perf_counter() - began,
     )

@@ -7,18 +7,16 @@ narrow island may lie there.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
-from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.synthesis.family import loop_family
-from drillctrl.synthesis.gain_margin import GainMargin, gain_margin
 
 _DIP = 0.3
 _CEILING = 10.0
@@ -26,32 +24,43 @@ _CEILING = 10.0
 CROSSING_TOLERANCE = 2e-5
 
 
+class Reached(Protocol):
+    """What is known of the best gains at a place."""
+
+    @property
+    def margin(self) -> float:
+        """Real part of the root that decides, less σ: negative where gains exist."""
+
+    @property
+    def omega(self) -> float:
+        """Frequency of the root that is held at the line."""
+
+
+# x, y, and whether to look all over the bounds or only near what is known.
+Decision = Callable[[float, float, bool], Reached]
+
+
 def scan_stabilisable(
-    plane: Plane,
-    structure: FeedbackStructure,
+    decide: Decision,
     positions: FloatArray,
+    low: float,
+    high: float,
     *,
-    level: float = 0.0,
     samples: int = 16,
-    low: float | None = None,
     progress: Callable[[], None] | None = None,
 ) -> list[ScanLine]:
     """Scan lines of constant x along y.
 
     Parameters
     ----------
-    plane : Plane
-        Supplies the operating point of every place.
-    structure : FeedbackStructure
-        One or two gains, with their bounds.
+    decide : callable
+        Answers for one place.
     positions : array, (N,)
         Values of x.
-    level : float
-        σ.
+    low, high : float
+        Ends of the lines.
     samples : int
         Evenly spaced places to begin with.
-    low : float, optional
-        Where lines begin; by default the lower limit of y.
     progress : callable, optional
         Called after each line.
 
@@ -61,29 +70,27 @@ def scan_stabilisable(
         ``counts`` is 0 where gains exist and 1 where not; ``omega`` is the frequency of the
         root that the best gains hold at the line.
     """
-    start = plane.y.low if low is None else low
     lines = []
     for position in positions.tolist():
-
-        def margin(y: float, x: float = position) -> GainMargin:
-            plant = plane.case_at(x, y).system(structure.inputs)
-            return gain_margin(loop_family(plant, structure), level)
-
-        lines.append(_scan(margin, position, start, plane.y.high, samples))
+        lines.append(_scan(functools.partial(decide, position), position, low, high, samples))
         if progress is not None:
             progress()
     return lines
 
 
 def _scan(
-    margin: Callable[[float], GainMargin], position: float, low: float, high: float, samples: int
+    decide: Callable[[float, bool], Reached],
+    position: float,
+    low: float,
+    high: float,
+    samples: int,
 ) -> ScanLine:
-    def value(y: float) -> float:
+    def value(y: float, everywhere: bool = False) -> float:
         # Brackets need finite ends, and the margin is infinite where no curve is in reach.
-        return float(np.clip(margin(y).margin, -_CEILING, _CEILING))
+        return float(np.clip(decide(y, everywhere).margin, -_CEILING, _CEILING))
 
     at = np.linspace(low, high, samples)
-    found = np.array([value(y) for y in at.tolist()])
+    found = np.array([value(y, True) for y in at.tolist()])
     for i in range(1, samples - 1):
         dip = found[i] <= found[i - 1] and found[i] <= found[i + 1]
         if dip and 0.0 < found[i] < _DIP:
@@ -102,7 +109,7 @@ def _scan(
             place = float(scipy.optimize.brentq(value, a, b, xtol=tolerance, rtol=1e-10))
         inner = tolerance if found[i + 1] < 0.0 else -tolerance
         crossings.append(place)
-        omega.append(margin(float(np.clip(place + inner, low, high))).omega)
+        omega.append(decide(float(np.clip(place + inner, low, high)), False).omega)
     stable = found[0] < 0.0
     counts = [0 if stable ^ (k % 2 == 1) else 1 for k in range(len(crossings) + 1)]
     jump = np.array([b - a for a, b in itertools.pairwise(counts)], dtype=np.int64)

@@ -65,18 +65,6 @@ class _Piece:
     frequency: Callable[[FloatArray], FloatArray]
 
 
-def check_gains(count: int) -> None:
-    """Refuse structures whose gains leave more than a curve.
-
-    Raises
-    ------
-    InputError
-        If there are more than two gains, or none.
-    """
-    if count not in (1, 2):
-        raise InputError("structure", f"{count} gains", "one with one or two free gains")
-
-
 def gain_margin(family: LoopFamily, line: float = 0.0) -> GainMargin:
     """Find the gains within the bounds that hold a root at the line and leave the rest lowest.
 
@@ -93,7 +81,8 @@ def gain_margin(family: LoopFamily, line: float = 0.0) -> GainMargin:
         If there are more gains, or several inputs.
     """
     count = family.feedback.lower.size
-    check_gains(count)
+    if count not in (1, 2):
+        raise InputError("structure", f"{count} gains", "one with one or two free gains")
     if not family.is_affine:
         raise InputError("structure", family.feedback.name, "one with a single input")
     middle = 0.5 * (family.feedback.lower + family.feedback.upper)

@@ -15,7 +15,9 @@ from drillctrl import (
     preset_structure,
     stabilisable_chart,
 )
+from drillctrl.charts.decisions import Searched, by_curves
 from drillctrl.charts.figure import plot_charts
+from drillctrl.charts.plane import make_plane
 from drillctrl.cli import main
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.gain_margin import gain_margin
@@ -23,6 +25,9 @@ from drillctrl.synthesis.gain_margin import gain_margin
 QUICK = {"first_lines": 3, "samples": 5, "tolerance": 1e-2}
 POINT = OperatingPoint(omega0=10.0, delta0=1.75, psi=14.0)
 SPEEDS = ("omega0", 8.0, 12.0)
+
+
+NO_GAINS = preset_structure("p").with_bounds({"K1": (-1.0, -1.0)})
 
 
 def margin_at(point, name):
@@ -84,13 +89,46 @@ def test_chart_holds_the_open_loop_and_a_wider_box_holds_a_narrower_one():
 
 def test_low_speeds_are_said_to_be_undecided():
     drawn = stabilisable_chart(POINT, ("omega0", 0.0, 4.0), ("delta0", 0.0, 1.0), "p", **QUICK)
-    assert drawn.undecided_area == pytest.approx(2.0 * np.pi / (4 * 2.1))
+    assert drawn.undecided_area == pytest.approx(2.0 * np.pi / (4 * 6.3))
     assert "undecided" in drawn.summary()
+
+
+def test_four_gains_reach_further_each_stable_place_proved():
+    narrow = ("omega0", 9.9, 10.1), ("delta0", 0.0, 40.0)
+    drawn = stabilisable_chart(POINT, *narrow, "case2", first_lines=3, samples=5, tolerance=0.05)
+    tops = [line.at[-1] for line in drawn.lines]
+    assert 19.0 < min(tops) <= max(tops) < 35.0
+    # Searches of their own, below and above the edge.
+    assert design(POINT.with_changes(delta0=min(tops) - 0.5), "case2", trials=False).stable
+    assert not design(POINT.with_changes(delta0=max(tops) + 1.0), "case2", trials=False).stable
+    stable = [place for place in drawn.places if place.stable]
+    for place in stable[:: len(stable) // 5]:
+        here = POINT.with_changes(omega0=place.x, delta0=place.y)
+        found = analyze(here, "case2", *preset_structure("case2").gains(place.gains))
+        assert found.stable
+        assert found.spectral_abscissa == pytest.approx(place.margin, abs=1e-9)
+    fields = json.loads(json.dumps(drawn.to_dict(), allow_nan=False))
+    assert fields["method"] == "search and count"
+    assert {place["decided_by"] for place in fields["places"]} == {"count", "search"}
+    assert "no proof" in drawn.summary()
+
+
+def test_search_and_curves_agree():
+    axes = ("omega0", 9.9, 10.1), ("delta0", 0.0, 15.0)
+    plane = make_plane(POINT, *axes, None, None, None)
+    structure = preset_structure("case1")
+    searched, curves = Searched(plane, structure, 0.0), by_curves(plane, structure, 0.0)
+    for y in (1.0, 6.0, 12.0, 13.5, 14.5):
+        assert (searched(10.0, y, True).margin < 0.0) == (curves(10.0, y, True).margin < 0.0)
 
 
 @pytest.mark.parametrize(
     ("options", "named"),
-    [({"structure": "case2"}, "structure"), ({"samples": 1}, "samples"), ({"level": 1e9}, "level")],
+    [
+        ({"structure": NO_GAINS}, "structure"),
+        ({"samples": 1}, "samples"),
+        ({"level": 1e9}, "level"),
+    ],
 )
 def test_bad_input_is_named(options, named):
     with pytest.raises(InputError, match=named):
@@ -124,7 +162,6 @@ def test_command_line(capsys, tmp_path):
     [
         ("--optimise",),
         ("--optimise", "--structure", "p", "--K1", "-2"),
-        ("--optimise", "--structure", "case2"),
         ("--bound", "K1=-1:1"),
     ],
 )
