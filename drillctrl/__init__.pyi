@@ -14,6 +14,9 @@ from .charts.stabilisable import stabilisable_chart as stabilisable_chart
 from .charts.volume import StabilityVolume as StabilityVolume
 from .charts.volume import stability_volume as stability_volume
 from .delay.closing import close_loop as close_loop
+from .delay.dynamic import dynamic_control as dynamic_control
+from .delay.dynamic import observer_control as observer_control
+from .delay.dynamic import pid_control as pid_control
 from .delay.instrumentation import with_actuator_lag as with_actuator_lag
 from .delay.instrumentation import with_filter as with_filter
 from .delay.instrumentation import with_late_output as with_late_output
