@@ -17,7 +17,7 @@ import scipy.optimize
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.synthesis.conditions import Conditions, conditions
-from drillctrl.synthesis.family import ActiveRoot, RootFamily
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily
 
 _NEWTON_STEPS = 15
 _SEQUENTIAL_STEPS = 15
@@ -115,7 +115,7 @@ def _configuration(
 
 
 def sharpen(
-    family: RootFamily,
+    family: LoopFamily,
     gains: FloatArray,
     abscissa: float,
     roots: tuple[ActiveRoot, ...],
@@ -124,7 +124,7 @@ def sharpen(
 
     Parameters
     ----------
-    family : RootFamily
+    family : LoopFamily
         Loops to choose from.
     gains : array, (k,)
         Where to start.

@@ -63,9 +63,7 @@ def nested_boxes(system: DelaySystem, feedback: FeedbackStructure) -> list[Feedb
     list of FeedbackStructure
         The structure alone where its bounds are not wide.
     """
-    lags = [*system.delays, *feedback_lags(system, feedback).ravel().tolist()]
-    shortest = min((lag for lag in lags if lag), default=np.inf)
-    speed = _FIRST * max(magnitude_bound(system, 0.0), 1.0 / shortest)
+    speed = natural_speed(system, feedback)
     reach = fastest(system, feedback, bound_of_entries(feedback))
     boxes: list[FeedbackStructure] = []
     # The gains that do least.
@@ -82,6 +80,13 @@ def nested_boxes(system: DelaySystem, feedback: FeedbackStructure) -> list[Feedb
         speed *= _FURTHER
     own = feedback.lower, feedback.upper
     return [b for b in boxes if not np.array_equal((b.lower, b.upper), own)] + [feedback]
+
+
+def natural_speed(system: DelaySystem, feedback: FeedbackStructure) -> float:
+    """Return the modulus of roots that gains of the innermost box are to permit."""
+    lags = [*system.delays, *feedback_lags(system, feedback).ravel().tolist()]
+    shortest = min((lag for lag in lags if lag), default=np.inf)
+    return _FIRST * max(magnitude_bound(system, 0.0), 1.0 / shortest)
 
 
 def _scales(system: DelaySystem, feedback: FeedbackStructure, speed: float) -> FloatArray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.synthesis.family import ActiveRoot, RootFamily
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily
 
 _TERMS = 6
 
@@ -23,7 +23,7 @@ class Conditions:
 
     Attributes
     ----------
-    family : RootFamily
+    family : LoopFamily
         Loops to choose from.
     roots : tuple of ActiveRoot
         The configuration.
@@ -33,7 +33,7 @@ class Conditions:
         u where the configuration was suggested.
     """
 
-    family: RootFamily
+    family: LoopFamily
     roots: tuple[ActiveRoot, ...]
     weights: tuple[FloatArray, ...]
     start: FloatArray
@@ -116,7 +116,7 @@ class Conditions:
 
 
 def conditions(
-    family: RootFamily, gains: FloatArray, abscissa: float, roots: tuple[ActiveRoot, ...]
+    family: LoopFamily, gains: FloatArray, abscissa: float, roots: tuple[ActiveRoot, ...]
 ) -> Conditions:
     """Pose the conditions of a configuration that was suggested at given gains."""
     omega = np.array([root.omega for root in roots])

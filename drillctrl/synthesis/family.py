@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -16,9 +15,9 @@ from drillctrl.delay.closing import close_loop, feedback_lags, loop_channels, wi
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.pseudospectral import degree_for, generator_matrix
+from drillctrl.spectrum.pseudospectral import degree_for, degree_for_reach, generator_matrix
 from drillctrl.spectrum.roots import spectral_abscissa
-from drillctrl.synthesis.boxes import bound_of_entries, largest_loop
+from drillctrl.synthesis.boxes import bound_of_entries, largest_loop, natural_speed
 from drillctrl.synthesis.expansion import Expansion, expand
 
 # Gains that need more make the loop far faster than its plant; their loops are looked at again.
@@ -45,25 +44,6 @@ class ActiveRoot:
     def equations(self) -> int:
         """Number of real conditions."""
         return self.multiplicity * (1 if self.omega == 0.0 else 2)
-
-
-class RootFamily(Protocol):
-    """What is needed to sharpen gains on the roots that are rightmost."""
-
-    @property
-    def feedback(self) -> FeedbackStructure:
-        """Structure of the loops."""
-
-    def exact(self, gains: FloatArray) -> float:
-        """Return the real part of the rightmost root."""
-
-    def eigenvalues(self, gains: FloatArray) -> ComplexArray:
-        """Return approximate roots, rightmost first."""
-
-    def taylor(
-        self, s: ComplexArray, gains: FloatArray, terms: int
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Expand the characteristic function and its derivatives by the gains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,7 +283,8 @@ def loop_family(
     if degree is None:
         # Three more than suffices to start an iteration on the characteristic equation.
         largest = largest_loop(system, feedback, bound_of_entries(feedback))
-        degree = min(degree_for(largest) + 3, max(_FINEST, degree_for(plain)))
+        resolved = degree_for_reach(natural_speed(system, feedback) * largest.max_delay)
+        degree = min(degree_for(largest), max(_FINEST, resolved)) + 3
     base = generator_matrix(plain, degree, [carried[delay] for delay in delays])
     size, n = base.shape[0], system.order
     # The oldest values of the signals of each delay.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import with_channels
-from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.robustness.norm import h_infinity_norm
 from drillctrl.robustness.radius import pseudospectral_abscissa
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
@@ -18,7 +16,7 @@ from drillctrl.spectrum.semidiscretization import semidiscretize
 from drillctrl.synthesis import descent, measures
 from drillctrl.synthesis.certificate import OptimalityCertificate, certify_optimality
 from drillctrl.synthesis.constrained import certify_sampled, constrained_search
-from drillctrl.synthesis.family import LoopFamily, loop_family
+from drillctrl.synthesis.family import LoopFamily
 from drillctrl.synthesis.objectives import (
     Exact,
     HInfinity,
@@ -29,15 +27,11 @@ from drillctrl.synthesis.objectives import (
     WorstLoop,
 )
 from drillctrl.synthesis.rounding import hold_multiple_root
-from drillctrl.synthesis.search import Search, global_search
+from drillctrl.synthesis.search import global_search
 
 # A requirement is met with this relative margin, so that rounding does not break it.
 _MARGIN = 1e-6
 _CANDIDATES = 3
-# Gains up to this are ordinary: those of the paper's bounds.
-_ORDINARY = 10.0
-# Degree of the collocation beyond which a search over it takes minutes.
-_MOST_RESOLVED = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +75,7 @@ def solve(
     seed : int
         Of the starting points.
     """
-    search = search_outwards(family, seed)
+    search = global_search(family, seed)
     plain = isinstance(objective, Exact)
     # What the unconstrained optimum meets is no constraint.
     if plain and meets(family, search.best.gains, requirements):
@@ -92,50 +86,6 @@ def solve(
     found = constrained_search(family, goal, excesses, candidates, seed)
     certificate = certify_sampled(family, goal, excesses, found, seed)
     return Solution(found.gains, certificate, search.evaluations + found.evaluations)
-
-
-def search_outwards(family: LoopFamily, seed: int = 0) -> Search:
-    """Search wide bounds from the inside out, decade by decade.
-
-    A search over bounds of thousands looks at few gains of ordinary size, and resolves them
-    badly. So ±10, ±100 and so on are searched before, as far as they lie within, and each
-    begins at the ends of the one before: wider bounds lose nothing.
-
-    Parameters
-    ----------
-    family : LoopFamily
-        Loops to choose from.
-    seed : int
-        Of the starting points.
-    """
-    feedback = family.feedback
-    known: list[FloatArray] = []
-    reach = float(np.abs([feedback.lower, feedback.upper]).max(initial=0.0))
-    if reach <= 2.0 * _ORDINARY or feedback.ties:
-        return global_search(family, seed)
-    size = _ORDINARY
-    while size < reach:
-        within = loop_family(family.system, _clipped(feedback, size))
-        if within.degree <= _MOST_RESOLVED:
-            found = global_search(within, seed, known=known)
-            known = [basin.gains for basin in found.basins[:_CANDIDATES]]
-        size *= 10.0
-    if family.degree > _MOST_RESOLVED:
-        # What the collocation then has wrong at large gains, exact roots find out.
-        family = loop_family(family.system, feedback, _MOST_RESOLVED)
-    return global_search(family, seed, known=known)
-
-
-def _clipped(feedback: FeedbackStructure, size: float) -> FeedbackStructure:
-    """Return the structure with gains of at most a size, where its bounds permit that."""
-    bounds = {}
-    for name in ("K1", "K2"):
-        low, high = getattr(feedback, f"{name}_lower"), getattr(feedback, f"{name}_upper")
-        inner = np.maximum(low, -size), np.minimum(high, size)
-        holds = inner[0] < inner[1]
-        bounds[f"{name}_lower"] = np.where(holds, inner[0], low)
-        bounds[f"{name}_upper"] = np.where(holds, inner[1], high)
-    return dataclasses.replace(feedback, **bounds)
 
 
 def meets(family: LoopFamily, gains: FloatArray, requirements: Requirements) -> bool:

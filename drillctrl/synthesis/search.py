@@ -12,7 +12,7 @@ from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
-from drillctrl.synthesis.family import ActiveRoot, LoopFamily, RootFamily, loop_family
+from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
@@ -223,7 +223,7 @@ def _settle(family: LoopFamily, basin: Basin, effort: Effort) -> tuple[Basin, in
     return best, used
 
 
-def improve(family: RootFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
+def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
     """Sharpen an end on every configuration of active roots that its spectrum suggests.
 
     Each success is looked at again: roots that have become active join the configuration.

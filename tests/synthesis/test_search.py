@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -134,6 +135,14 @@ def test_wide_bounds_keep_the_optimum_of_narrow_ones(point_c):
     assert wide.spectral_abscissa == pytest.approx(narrow.spectral_abscissa, abs=1e-9)
     assert pytest.approx(narrow.K1, rel=1e-6) == wide.K1
     assert wide.optimality.stationarity < 1e-6
+
+
+def test_what_bounds_are_wide_does_not_depend_on_units(plant_c):
+    """The same plant with its torque in units of 10 000."""
+    other = replace(plant_c, B=1e4 * plant_c.B)
+    for name, bound, alpha in (("p", 1.0, -0.169953919), ("pd", 0.03, -0.783302734)):
+        found = design(other, name, bounds={"K1": (-bound, bound)}, trials=False)
+        assert found.spectral_abscissa == pytest.approx(alpha, abs=1e-8)
 
 
 def test_boxes_widen_to_the_bounds(plant_c):
