@@ -15,7 +15,12 @@ from drillctrl.delay.closing import close_loop, feedback_lags, loop_channels, wi
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.pseudospectral import degree_for, degree_for_reach, generator_matrix
+from drillctrl.spectrum.pseudospectral import (
+    _blocks,
+    degree_for,
+    degree_for_reach,
+    generator_matrix,
+)
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis.boxes import bound_of_entries, largest_loop, natural_speed
 from drillctrl.synthesis.expansion import Expansion, expand
@@ -268,16 +273,26 @@ def loop_family(
     if late.any() and not system.feedback_delay:
         raise InputError("structure", feedback.name, "without delayed outputs: no delay is known")
     plain = with_terms(system, drive, measure, feedback.fixed.reshape(every_lag.shape), every_lag)
-    # Carry what the plant delays anyway and the measured outputs that are fed back late.
+    # Carry what the plant delays anyway and what is fed back late: the measured outputs, or
+    # what is sent to the inputs where that is less.
     nothing = np.zeros((system.order, 0)), np.zeros((0, system.order))
     carried = dict(zip(plain.delays, plain.factors, strict=True))
-    used = {pair for pair in zip(lags.tolist(), source.tolist(), strict=True) if pair[0]}
-    for lag, output in sorted(used):
+    sent: dict[float, list[int]] = {}
+    for lag in sorted(set(lags[lags > 0.0].tolist())):
         left, right = carried.get(lag, nothing)
-        wider = np.vstack([right, measure[output]])
-        if np.linalg.matrix_rank(wider) > right.shape[0]:
-            left, right = np.hstack([left, np.zeros((system.order, 1))]), wider
-        carried[lag] = left, right
+        wide = right
+        for output in sorted(set(source[lags == lag].tolist())):
+            wider = np.vstack([wide, measure[output]])
+            if np.linalg.matrix_rank(wider) > wide.shape[0]:
+                wide = wider
+        more = len(wide) - len(right)
+        inputs = sorted(set(target[lags == lag].tolist()))
+        if len(inputs) < more:
+            sent[lag] = inputs
+            none = np.zeros((len(inputs), system.order))
+            carried[lag] = np.hstack([left, drive[:, inputs]]), np.vstack([right, none])
+        else:
+            carried[lag] = np.hstack([left, np.zeros((system.order, more))]), wide
     delays = tuple(sorted(carried))
     plain = replace(plain, delays=delays, delayed=tuple(map(plain.delayed_matrix, delays)))
     if degree is None:
@@ -292,13 +307,22 @@ def loop_family(
     actuation = np.zeros((size, entries.size))
     actuation[:n] = drive[:, target]
     measurement = np.zeros((entries.size, size))
-    for row, (lag, output) in enumerate(zip(lags.tolist(), source, strict=True)):
-        if lag:
-            right, end = carried[lag][1], ends[delays.index(lag)]
-            weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
-            measurement[row, end - right.shape[0] : end] = weights
-        else:
+    for row, (lag, entering, output) in enumerate(
+        zip(lags.tolist(), target.tolist(), source.tolist(), strict=True)
+    ):
+        if not lag:
             measurement[row, :n] = measure[output]
+            continue
+        right, end = carried[lag][1], ends[delays.index(lag)]
+        rank = len(right)
+        if lag in sent:
+            signal = rank - len(sent[lag]) + sent[lag].index(entering)
+            actuation[:n, row] = 0.0
+            actuation[end - degree * rank : end, row] = _blocks(degree, rank)[1][:, signal] / lag
+            measurement[row, :n] = measure[output]
+        else:
+            weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
+            measurement[row, end - rank : end] = weights
     return LoopFamily(
         system,
         feedback,
@@ -307,7 +331,7 @@ def loop_family(
         measurement,
         spread[entries],
         plain,
-        actuation[:n],
+        drive[:, target],
         measure[source],
         lags,
         degree,

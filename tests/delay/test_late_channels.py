@@ -115,6 +115,27 @@ def test_families_and_batches_have_the_abscissa_of_the_loop(many):
     assert delta == pytest.approx(characteristic.matrix(family.loop(vectors[0]), S), rel=1e-12)
 
 
+def test_many_outputs_through_one_late_input_are_one_signal():
+    rng = np.random.default_rng(4)
+    plant = DelaySystem(
+        rng.normal(size=(4, 4)) - 3.0 * np.eye(4),
+        (0.5 * rng.normal(size=(4, 4)),),
+        (0.6,),
+        rng.normal(size=(4, 1)),
+        input_delays=(1.1,),
+        output_names=("y1", "y2", "y3", "y4"),
+    )
+    structure = feedback(1, 4, now=0.8, late=0.0)
+    family = loop_family(plant, structure)
+    assert len(family.base) == 4 + (4 + 1) * family.degree
+    for vector in rng.uniform(-0.8, 0.8, (5, 4)):
+        value, gradient = family.abscissa(vector)
+        assert value == pytest.approx(spectral_abscissa(family.loop(vector)), abs=1e-6)
+        steps = 1e-6 * np.eye(4)
+        slopes = [(family.value(vector + h) - family.value(vector - h)) / 2e-6 for h in steps]
+        assert gradient == pytest.approx(slopes, abs=1e-5)
+
+
 def test_feedback_may_be_earlier_than_a_state_arrives():
     """A double integrator with feedback 0.2 late, beside a state that hears itself after 1."""
     a0, late = np.diag([1.0, 0.0], 1), np.zeros((3, 3))
