@@ -95,7 +95,7 @@ def with_terms(
         K1 and K2, and the delay of each entry.
     """
     matrices = {0.0: system.A0, **dict(zip(system.delays, system.delayed, strict=True))}
-    for lag in np.unique(lags[gains != 0.0]).tolist():
+    for lag in set(lags[gains != 0.0].tolist()):
         part = np.where(lags == lag, gains, 0.0).sum(axis=0)
         matrices[lag] = system.delayed_matrix(lag) if lag else system.A0
         matrices[lag] = matrices[lag] + drive @ part @ measure
@@ -125,7 +125,8 @@ def feedback_lags(
     late = system.feedback_delay if delay is None else checked_number("delay", delay, 0.0)
     acts = [system.input_delays[system.input_names.index(name)] for name in feedback.inputs]
     seen = [system.output_delays[system.output_names.index(name)] for name in feedback.outputs]
-    return np.asarray(np.add.outer([0.0, late], np.add.outer(acts, seen)), dtype=float)
+    channels = np.array(acts)[:, None] + seen
+    return np.stack([channels, channels + late])
 
 
 def with_channels(
