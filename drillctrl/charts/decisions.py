@@ -11,7 +11,6 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.pseudospectral import degree_for
-from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.gain_margin import GainMargin, gain_margin
 from drillctrl.synthesis.reach import searched_reach
@@ -31,7 +30,7 @@ class Place:
     gains : array, (k,)
         The best that were found.
     margin : float
-        Real part of the rightmost root with them, less σ.
+        Real part of the rightmost root with them, less σ; infinite where it could not be told.
     stable : bool
         Whether a count by the argument principle finds no root right of σ: that is proved.
         Otherwise gains were searched for and not found, which proves nothing.
@@ -67,7 +66,7 @@ class Searched:
         stable = reach.margin < 0.0 and count_right_of(loop, self.level).count == 0
         # Roots and count that contradict each other decide nothing.
         margin = reach.margin if stable == (reach.margin < 0.0) else abs(reach.margin)
-        omega = dominant_roots(loop)[0].imag
+        omega = abs(family.eigenvalues(reach.gains)[0].imag)
         place = Place(x, y, reach.gains, margin, stable, omega)
         self.places.append(place)
         return place

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.text import finite_or_none
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.chart import chart
@@ -133,7 +134,7 @@ class StabilisableChart:
                     plane.x.name: place.x,
                     plane.y.name: place.y,
                     "gains": place.gains.tolist(),
-                    "spectral_abscissa": self.level + place.margin,
+                    "spectral_abscissa": finite_or_none(self.level + place.margin),
                     "stable": place.stable,
                     "decided_by": "count" if place.stable else "search",
                 }

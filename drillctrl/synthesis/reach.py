@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import LoopFamily
 from drillctrl.synthesis.search import Effort, global_search
@@ -55,9 +56,23 @@ def searched_reach(
     inset = _INSIDE * (upper - lower)
     starts = [np.clip(gains, lower + inset, upper - inset) for gains in known]
     ends = [bfgs(family.abscissa, start, lower, upper, most=_STEPS).gains for start in starts]
-    # Exact: near a multiple root the collocation promises more than there is.
-    found = [Reach(family.exact(gains) - line, gains) for gains in [*ends, *known]]
+    found = [Reach(_exact(family, gains) - line, gains) for gains in [*ends, *known]]
     if not found or (everywhere and min(reach.margin for reach in found) >= 0.0):
-        best = global_search(family, 0, _EFFORT, ends).best
-        found.append(Reach(family.exact(best.gains) - line, best.gains))
+        try:
+            best = global_search(family, 0, _EFFORT, ends).best.gains
+        except InputError:
+            # Some loop on the way has roots that cannot be told apart; the middle is as good.
+            best = 0.5 * (lower + upper)
+        found.append(Reach(_exact(family, best) - line, best))
     return min(found, key=lambda reach: reach.margin)
+
+
+def _exact(family: LoopFamily, gains: FloatArray) -> float:
+    """Return α, which the collocation promises too low near multiple roots.
+
+    It is infinite where roots cannot be told apart: such gains are not found to do anything.
+    """
+    try:
+        return family.exact(gains)
+    except InputError:
+        return np.inf
