@@ -81,6 +81,8 @@ def test_require_stable(capsys):
     assert run(capsys, *base, "--delta0", 1.75)[0] == 0
 
 
+AT_RIG = ("--rig", "table1", "--speed", "120 rpm", "--rop", "20 m/h")
+CONTROLLED = ("simulate", *AT_RIG, "--structure", "p")
 BAD = [
     (["analyze", "--omega0", "0"], "omega0 = 0.0: must be"),
     (["analyze", "--omega0", "nan"], "omega0 = nan: must be"),
@@ -130,6 +132,16 @@ BAD = [
     (["simulate", "--structure", "p", "--K1", "1", "--limit", "3 kN*m"], "--limit = 3 kN*m"),
     (["simulate", "--structure", "p", "--K1", "1", "--noise", "theta=a"], "--noise = theta=a"),
     (["simulate", "--structure", "p", "--K1", "1", "--delay", "now"], "delay = now"),
+    ([*CONTROLLED, "--K1", "304"], "'304 N*m/rad', or '285152 N*m/rad' for the dimensionless 304"),
+    ([*CONTROLLED, "--K1", "1 kN/m"], "--K1 = '1 kN/m': must be a gain in N*m/rad"),
+    ([*CONTROLLED, "--K1", "1 kN*m/rad,2"], "--K1 = 1 kN*m/rad,2: must be 1 gain(s)"),
+    ([*CONTROLLED, "--K1", "1 kN*m/rad", "--limit", "3"], "--limit = 3: must be given with its"),
+    ([*CONTROLLED, "--K1", "1 kN*m/rad", "--period", "0.1"], "--period = 0.1: must be given with"),
+    (["analyze", *AT_RIG, "--structure", "p", "--K1", "-3"], "'-3 N*m/rad', or '-2814 N*m/rad'"),
+    (["design", *AT_RIG, "--bound", "K1=-3:3"], "'-3 N*m/rad', or '-2814 N*m/rad'"),
+    (["design", *AT_RIG, "--structure", "pd", "--bound", "K1=-3:3 kN*m/rad"], "each of K1_1 (N*m"),
+    (["compare", *AT_RIG, "--given", "a=p:-3"], "--given = -3: must be given with its unit"),
+    (["chart", *AT_RIG, "--structure", "p", "--x", "K1_1=-3:3"], "--x = -3.0: must be given with"),
     (["simulate", "--floquet", "--delta0", "0.5", "--duration", "50"], "run = 50 time units"),
     (["invent"], "invent"),
 ]
@@ -210,12 +222,14 @@ def test_simulate_a_controller_as_it_runs_on_a_rig(capsys, tmp_path):
     from drillctrl import Controller, RigPoint, simulate, table1
 
     rig = table1()
-    unit = rig.time_scale
+    unit, kt = rig.time_scale, rig.torsional_stiffness
     motion = tmp_path / "motion.csv"
     status, out, _ = run(
         capsys, "simulate", "--rig", "table1", "--speed", "270 rpm", "--rop", "45 m/h",
-        "--structure", "case2", "--K1", "-5.03,-4.91", "--K2", "-1.67,-0.31",
-        "--period", "10 ms", "--actuator-lag", "20 ms", "--limit", "1 kN*m", "--rate-limit", 5,
+        "--structure", "case2", "--K1", f"{-5.03 * kt} N*m/rad, {-4.91 * kt * unit} N*m*s/rad",
+        "--K2", f"{-1.67 * kt} N*m/rad, {-0.31 * kt * unit} N*m*s/rad",
+        "--period", "10 ms", "--actuator-lag", "20 ms", "--limit", "1 kN*m",
+        "--rate-limit", f"{5.0 * kt / unit} N*m/s",
         "--noise", "theta=0.001", "--seed", 4, "--activation", "0.5 s",
         "--duration", "4 s", "--out", motion, "--json",
     )  # fmt: skip

@@ -44,6 +44,7 @@ ROTARY_SPEED = Dimension("a rotary speed", "rad/s", "'120 rpm' or '12.6 rad/s'",
 SPEED = Dimension("a speed", "m/s", "'20 m/h' or '65 ft/h'")
 FORCE = Dimension("a force", "N", "'100 kN' or '22 klbf'")
 TORQUE = Dimension("a torque", "N*m", "'5 kN*m' or '3700 ft*lbf'")
+TORQUE_RATE = Dimension("a rate of torque", "N*m/s", "'50 kN*m/s'")
 STRESS = Dimension("a stress", "Pa", "'60 MPa' or '8700 psi'")
 LENGTH = Dimension("a length", "m", "'108 mm' or '4.25 in'")
 MASS = Dimension("a mass", "kg", "'34000 kg' or '75000 lb'")
@@ -70,23 +71,49 @@ _DEFINITIONS = (
     "rev = revolution",
     "hr = hour",
     "ppg = pound / gallon",
+    "pcf = pound / foot ** 3",
+    "sg = 1000 * kilogram / meter ** 3",
+    "ppf = pound / foot",
+    "fph = foot / hour",
+    "fpm = foot / minute",
 )
-
+# What is a weight on every rig floor and a mass in pint.
+_AS_FORCE = {
+    "t": "metric_ton_force",
+    "te": "metric_ton_force",
+    "tonne": "metric_ton_force",
+    "tonnes": "metric_ton_force",
+    "kg": "kgf",
+    "lb": "lbf",
+    "lbs": "lbf",
+    "klb": "klbf",
+    "klbs": "klbf",
+    "klbsf": "klbf",
+    "ftlb": "ft*lbf",
+    "ftlbs": "ft*lbf",
+}
+# What two people in drilling read as two different things.
+_TWO_READINGS = {
+    "ton": "'tonne' (1000 kg) or 'short_ton' (907.185 kg)",
+    "tons": "'tonne' (1000 kg) or 'short_ton' (907.185 kg)",
+    "mph": "'m/h' or 'mile/h'",
+    "Mlb": "'klb' (a thousand) or '1000 klb' (a million)",
+    "Mlbs": "'klb' (a thousand) or '1000 klb' (a million)",
+    "Mlbf": "'klbf' (a thousand) or '1000 klbf' (a million)",
+}
+# Turns a minute, as they stand on motors and in European data sheets.
+_TURNS_A_MINUTE = ("1/min", "/min", "min^-1", "min⁻¹", "r/min")
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
-_UNIT = r"(?:[A-Za-zµμ°²³()·*/ \-]|(?:\^|\*\*)-?[1-4](?![\d*^]))*"
+_FRACTION = r"(?:(?P<whole>\d{1,4})[ -])?(?P<over>\d{1,3})/(?P<under>\d{1,3})(?=[ \"'a-z])"
+_UNIT = r"(?:[A-Za-zµμ°²³()·*/ _.\-]|(?:\^|\*\*)-?[1-4](?![\d*^]))*|[\"']|1/min|min⁻¹"
 
 
 @functools.cache
 def _registry() -> pint.UnitRegistry[Any]:
     import pint
 
-    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(
-        preprocessors=[
-            lambda text: re.sub(r"\b(k?)(ft|in)[-·\s]*(k?lbf)\b", r"\1\2*\3", text),
-            lambda text: text.replace("·", "*"),
-        ]
-    )
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry()
     for line in _DEFINITIONS:
         name = line.split(" =")[0]
         registry._units.pop(name, None)
@@ -115,36 +142,68 @@ def to_si(parameter: str, value: object, dimension: Dimension) -> float:
     Raises
     ------
     InputError
-        If the text is no quantity, or is one of another dimension.
+        If the text is no quantity, is one of another dimension, or has two readings.
     """
     permitted = f"{dimension.name}, such as {dimension.examples}"
     if not isinstance(value, str):
         raise InputError(parameter, value, f"{permitted} (a text with its unit)")
+    number, written = _split(value, dimension)
+    for word in re.findall(r"[A-Za-z_]+", written):
+        if word in _TWO_READINGS:
+            raise InputError(parameter, repr(value), f"one of two things: {_TWO_READINGS[word]}")
     import pint
 
-    number, unit = _split(value)
-    try:
-        magnitude = float(number)
-        registry = _registry()
-        root = registry.Quantity(1.0, unit).to_root_units()
-        wanted = registry.Quantity(1.0, dimension.unit).to_root_units()
-        has_angle, wants_angle = ("radian" in q._units for q in (root, wanted))
-        if (has_angle and not wants_angle) or (dimension.angle_required and not has_angle):
-            raise ValueError
-        si = float(registry.Quantity(magnitude, unit).to(dimension.unit).magnitude)
-    except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
-        raise InputError(parameter, repr(value), permitted) from None
+    si = None
+    for unit in _readings(written, dimension):
+        try:
+            si = _converted(float(number), unit, dimension)
+            break
+        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+            continue
+    if si is None:
+        raise InputError(parameter, repr(value), permitted)
     return checked_number(parameter, si)
 
 
-def _split(text: str) -> tuple[str, str]:
+def _converted(magnitude: float, unit: str, dimension: Dimension) -> float:
+    registry = _registry()
+    root = registry.Quantity(1.0, unit).to_root_units()
+    wanted = registry.Quantity(1.0, dimension.unit).to_root_units()
+    has_angle, wants_angle = ("radian" in q._units for q in (root, wanted))
+    if (has_angle and not wants_angle) or (dimension.angle_required and not has_angle):
+        raise ValueError
+    return float(registry.Quantity(magnitude, unit).to(dimension.unit).magnitude)
+
+
+def _readings(written: str, dimension: Dimension) -> tuple[str, ...]:
+    """Return a unit in pint's language, as it stands and then as it is meant on a rig."""
+    unit = written.strip()
+    if dimension == LENGTH and unit in ('"', "'"):
+        return ("in" if unit == '"' else "ft",)
+    if dimension == ROTARY_SPEED and unit in _TURNS_A_MINUTE:
+        return ("rpm",)
+    # kN.m, ft-lb, kN·m.
+    unit = re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", "*", unit).replace("·", "*")
+    unit = re.sub(r"\b(k?)(ft|in)(k?lbf)\b", r"\1\2*\3", unit)
+    if dimension in (MASS, DENSITY, LINEAR_DENSITY, INERTIA):
+        return (unit,)
+    return unit, re.sub(r"[A-Za-z_]+", lambda m: _AS_FORCE.get(m[0], m[0]), unit)
+
+
+def _split(text: str, dimension: Dimension) -> tuple[str, str]:
     """Split a quantity into number and unit; both empty if it has not that form.
 
     The unit may hold single-digit exponents only, so that no text can make the parser
     evaluate a tower of powers.
     """
-    match = re.fullmatch(rf"\s*({_NUMBER})\s*({_UNIT})\s*", text)
-    return (match[1], match[2]) if match and len(text) <= 80 else ("", "")
+    text = text.strip() if len(text) <= 80 else ""
+    # 12 1/4 in, as bits and pipes are called.
+    fraction = re.match(_FRACTION, text) if dimension == LENGTH else None
+    if fraction and int(fraction["under"]):
+        part = int(fraction["over"]) / int(fraction["under"])
+        text = f"{int(fraction['whole'] or 0) + part!r}{text[fraction.end() :]}"
+    match = re.fullmatch(rf"({_NUMBER})\s*({_UNIT})", text)
+    return (match[1], match[2]) if match else ("", "")
 
 
 def from_si(value: float, dimension: Dimension, unit: str) -> float:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from drillctrl.cli.gains import read_gains
+from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
     NOT_STABILISED,
@@ -22,7 +22,9 @@ from drillctrl.cli.verb import Verb
 @click.command(name="analyze", cls=Verb)
 @point_options
 @click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
-@click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
+@click.option(
+    "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
+)
 @click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
 @click.option("--m", type=int, help="Intervals of the semi-discretisation reported.")
 @click.option("--order", type=int, default=2, show_default=True, help="Its order: 0, 1 or 2.")
@@ -49,12 +51,15 @@ def analyze_command(
     Examples:
       drillctrl analyze --omega0 10 --delta0 1.75 --psi 14
       drillctrl analyze --structure case1 --K1 -5.17 --K2 5.06 --m 3 --order 0
+      drillctrl analyze --rig table1 --speed "150 rpm" --rop "20 m/h" \\
+          --structure p --K1 "-2 kN*m/rad"
     """
     check_outputs(out, plot)
     where = read_point(point)
     from drillctrl.designs.design import analyze
 
-    gains = read_gains("K1", k1), read_gains("K2", k2)
+    scales = scales_at(where, structure)
+    gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
     result = analyze(where, structure, *gains, m=m, order=order, trials=wants_trials(trials))
     deliver(result, prove, as_json, out, plot)
     if require_stable and (not result.stable or result.verdict.refused):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.gains import read_bounds, read_gains
+from drillctrl.cli.gains import Scales, read_bounds, read_gains, scales_at
 from drillctrl.cli.output import (
     check_figure,
     check_folder,
@@ -20,7 +20,7 @@ from drillctrl.cli.output import (
     writing,
 )
 from drillctrl.cli.point import point_options, read_point
-from drillctrl.cli.verb import Verb
+from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
     from drillctrl.charts.chart import StabilityChart
@@ -122,7 +122,7 @@ def chart_command(
       drillctrl chart --x omega0=0:25 --y delta0=0:15 --psi 14 --plot chart.png
       drillctrl chart --x K1_1=-10:10 --y K2_1=-10:10 --structure case1
       drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
-          --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 -2
+          --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 "-2 kN*m/rad"
       drillctrl chart --z psi=0.1:26 --y delta0=0:5 --out volume.vtk
       drillctrl chart --optimise --structure p --x omega0=0:25 --y delta0=0:18
     """
@@ -132,7 +132,9 @@ def chart_command(
     check_figure(plot)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
     where = read_point(_with_axes(point, x, y))
-    gains = read_gains("K1", k1), read_gains("K2", k2)
+    scales = scales_at(where, structure)
+    x, y = _gain_axis("--x", x, structure, scales), _gain_axis("--y", y, structure, scales)
+    gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
     result: StabilityChart | StabilisableChart | StabilityVolume
     if z_axis is not None:
         if optimise or level or bound:
@@ -157,6 +159,23 @@ def chart_command(
         assert figure is not None
         write_figure(plot, figure)
     click.echo(json_text(fields) if as_json else result.summary())
+
+
+def _gain_axis(
+    option: str,
+    axis: tuple[str, object, object],
+    structure: str | None,
+    scales: Scales | None,
+) -> tuple[str, object, object]:
+    """Return an axis, dimensionless if it is a gain's."""
+    name, low, high = axis
+    if scales is None or structure is None or not name.startswith(("K1", "K2")):
+        return axis
+    from drillctrl.drilling.structures import as_structure
+
+    with naming(option, "--bound"):
+        text = f"{name}={low}:{high}"
+        return name, *read_bounds((text,), as_structure(structure), scales)[name]
 
 
 def _volume(
@@ -194,7 +213,8 @@ def _optimised(
             raise InputError(name, str(given), "left out with --optimise")
     if structure is None:
         raise InputError("--structure", "(missing)", "given with --optimise")
-    chosen = preset_structure(structure).with_bounds(read_bounds(bound))
+    preset = preset_structure(structure)
+    chosen = preset.with_bounds(read_bounds(bound, preset, scales_at(where, preset)))
     result = stabilisable_chart(where, x, y, chosen, level=level, progress=_show_progress)
     if sys.stderr.isatty():
         click.echo(err=True)

@@ -9,14 +9,15 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
-from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.gains import read_bounds, read_gains, scales_at
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.roots import trials_option, wants_trials
-from drillctrl.cli.verb import Verb
+from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.studies.compare import Given
     from drillctrl.studies.comparison import Comparison
 
@@ -70,16 +71,19 @@ def compare_command(
         required("matplotlib", "figures")
     tried = wants_trials(trials)
     where, names = read_point(point), [name.strip() for name in structures.split(",")]
-    candidates = [read_given(text) for text in given]
+    candidates = [read_given(text, where) for text in given]
     from drillctrl.cli.scenario import read_numbers
+    from drillctrl.drilling.structures import preset_structure
     from drillctrl.studies.compare import REGION, compare
 
+    # Its gains are those of all presets.
+    every = preset_structure("case2")
     with open_progress() as progress:
         result = compare(
             where,
             [name for name in names if name],
             given=candidates,
-            bounds=read_bounds(bound),
+            bounds=read_bounds(bound, every, scales_at(where, every)),
             disturbance=read_numbers("--initial", initial, "dx=1,dtheta=1"),
             duration=duration,
             region=None if no_charts else REGION,
@@ -92,7 +96,7 @@ def compare_command(
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
 
 
-def read_given(text: str) -> Given:
+def read_given(text: str, where: OperatingPoint | RigPoint) -> Given:
     """Return label, structure and gains from a text such as ``paper=case1:-5.17:5.06``.
 
     Raises
@@ -104,15 +108,16 @@ def read_given(text: str) -> Given:
     parts = rest.split(":")
     if not equals or not label.strip() or len(parts) not in (2, 3):
         raise InputError("--given", text, "of the form NAME=STRUCTURE:K1:K2")
-    gains: list[list[float] | None] = []
-    for part in parts[1:]:
-        try:
-            gains.append([float(value) for value in part.split(",")])
-        except ValueError:
-            raise InputError("--given", text, "with gains that are numbers") from None
+    structure = parts[0].strip()
+    scales = scales_at(where, structure)
+    with naming("--given", "--K1", "--K2"):
+        gains = [
+            read_gains(name, part, scales)
+            for name, part in zip(("K1", "K2"), parts[1:], strict=False)
+        ]
     now, past = (*gains, None)[:2]
     assert now is not None
-    return label.strip(), parts[0].strip(), now, past
+    return label.strip(), structure, now, past
 
 
 def _write(result: Comparison, out: str) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.gains import read_bounds, scales_at
 from drillctrl.cli.objective import (
     objective_options,
     read_objective,
@@ -37,7 +37,7 @@ from drillctrl.cli.verb import Verb
     "--bound",
     multiple=True,
     metavar="GAIN=LOW:HIGH",
-    help="For K1, K2 or one gain such as K1_2; may be repeated.",
+    help="For K1, K2 or one gain such as K1_2; with a rig 'K1=-3:3 kN*m/rad'; repeatable.",
 )
 @objective_options
 @requirement_options
@@ -73,11 +73,13 @@ def design_command(
     objective, requirements = read_objective(options), read_requirements(options)
     where = read_point(options)
     from drillctrl.designs.design import design
+    from drillctrl.drilling.structures import as_structure
 
+    chosen = as_structure(structure)
     result = design(
         where,
-        structure,
-        bounds=read_bounds(bound),
+        chosen,
+        bounds=read_bounds(bound, chosen, scales_at(where, chosen)),
         objective=objective,
         requirements=requirements,
         seed=seed,

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.cli.gains import read_gains
+from drillctrl.cli.gains import read_gains, scales_at
+from drillctrl.cli.quantity import read_quantity
 
 if TYPE_CHECKING:
     from drillctrl.base.units import Dimension
-    from drillctrl.drilling.point import OperatingPoint
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.drilling.rig import Rig
     from drillctrl.simulation.controller import Controller
     from drillctrl.simulation.scenario import Scenario
@@ -27,7 +28,9 @@ def controller_options(command: Command) -> Command:
     """Add the options that say what closes the loop."""
     options = [
         click.option("--structure", help="p, case1, pd or case2; without it, no control."),
-        click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91."),
+        click.option(
+            "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
+        ),
         click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs."),
         click.option(
             "--table", type=click.Path(), help="Gains from a table that `drillctrl table` wrote."
@@ -40,9 +43,9 @@ def controller_options(command: Command) -> Command:
         click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
         click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
         click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
-        click.option("--limit", metavar="TORQUE", help="Largest |u|, such as 3 or '5 kN*m'."),
+        click.option("--limit", metavar="TORQUE", help="Largest |u|: 3, or '5 kN*m' with a rig."),
         click.option(
-            "--rate-limit", type=float, help="Fastest change of u, per unit of time."
+            "--rate-limit", metavar="RATE", help="Fastest change of u: 5, or '50 kN*m/s'."
         ),
         click.option(
             "--noise", default="", metavar="NAME=DEVIATION",
@@ -67,24 +70,15 @@ def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
     return numbers
 
 
-def read_quantity(option: str, text: str, dimension: Dimension, unit: float | None) -> float:
-    """Return a dimensionless number from one, or from a quantity where the rig's unit is known."""
-    try:
-        return float(text)
-    except ValueError:
-        pass
-    from drillctrl.base import units
-
-    if unit is None:
-        raise InputError(option, text, "a dimensionless number, or a rig to go with its unit")
-    return units.to_si(option, text, dimension) / unit
-
-
 def read_time(option: str, text: str, rig: Rig | None) -> float:
     """Return dimensionless time from a number, or from seconds of a rig."""
     from drillctrl.base import units
 
-    return read_quantity(option, text, units.TIME, None if rig is None else rig.time_scale)
+    try:
+        return float(text)
+    except ValueError:
+        unit = None if rig is None else rig.time_scale
+        return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
 
 
 def read_scenario(
@@ -142,6 +136,7 @@ def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:
 
 def read_controller(
     options: Mapping[str, Any],
+    where: OperatingPoint | RigPoint,
     point: OperatingPoint,
     scenario: Scenario,
     duration: float,
@@ -157,15 +152,21 @@ def read_controller(
     from drillctrl.base import units
 
     given: dict[str, Any] = {}
-    for name in ("activation", "period", "measurement_delay", "actuator_lag"):
+    if options["activation"] is not None:
+        given["activation"] = read_time("--activation", options["activation"], rig)
+    time = 1.0 if rig is None else rig.time_scale
+    torque = 1.0 if rig is None else rig.torsional_stiffness
+    for name, dimension, unit in (
+        ("period", units.TIME, time),
+        ("measurement_delay", units.TIME, time),
+        ("actuator_lag", units.TIME, time),
+        ("limit", units.TORQUE, torque),
+        ("rate_limit", units.TORQUE_RATE, torque / time),
+    ):
         if options[name] is not None:
             option = f"--{name.replace('_', '-')}"
-            given[name] = read_time(option, options[name], rig)
-    if options["limit"] is not None:
-        unit = None if rig is None else rig.torsional_stiffness
-        given["limit"] = read_quantity("--limit", options["limit"], units.TORQUE, unit)
-    if options["rate_limit"] is not None:
-        given["rate_limit"] = options["rate_limit"]
+            known = None if rig is None else unit
+            given[name] = read_quantity(option, options[name], dimension, known) / unit
     if options["noise"]:
         given["noise"] = read_numbers("--noise", options["noise"], "theta=0.01,dtheta=0.1")
         given["seed"] = options["seed"]
@@ -186,10 +187,11 @@ def read_controller(
         return None
     from drillctrl.simulation.controller import Controller
 
-    K1 = read_gains("K1", now)
+    scales = scales_at(where, structure)
+    K1 = read_gains("K1", now, scales)
     if K1 is None:
         raise InputError("--K1", "(missing)", f"given for structure {structure}")
-    return Controller(structure, K1, read_gains("K2", past), **given)
+    return Controller(structure, K1, read_gains("K2", past, scales), **given)
 
 
 def _from_table(

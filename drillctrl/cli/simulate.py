@@ -114,7 +114,7 @@ def simulate_command(
     length = read_duration(duration, rig)
     kick = initial if initial is not None else "" if start == "rest" else "dx=1,dtheta=1"
     scenario = read_scenario(start, kick, change, groups, rig)
-    controller = read_controller(options, groups, scenario, length, rig)
+    controller = read_controller(options, where, groups, scenario, length, rig)
     common: dict[str, Any] = {
         "scenario": scenario,
         "duration": length,

@@ -10,11 +10,12 @@ import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.cli.gains import read_bounds
+from drillctrl.cli.gains import gain_scales, read_bounds
 from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.progress import open_progress
+from drillctrl.cli.quantity import read_quantity
 from drillctrl.cli.roots import trials_option, wants_trials
 from drillctrl.cli.verb import Verb, naming
 
@@ -64,8 +65,10 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--from", "source", type=click.Path(), metavar="FILE", help="A saved table instead of a design."
 )
-@click.option("--period", type=float, help="Of a .c or .st controller; s with a rig.")
-@click.option("--limit", type=float, help="Largest |u| of a .c or .st controller; N·m with a rig.")
+@click.option(
+    "--period", metavar="TIME", help="Of a .c or .st controller, such as 0.01; '10 ms' with a rig."
+)
+@click.option("--limit", metavar="TORQUE", help="Its largest |u|, such as 5; '5 kN*m' with a rig.")
 @click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
 @click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
 @click.option(
@@ -109,10 +112,11 @@ def table_command(
 
         with naming("--from", "table"):
             result = load_table(source)
+        controller = _in_units(controller, result.grid)
         _check_out(out, controller, result.grid, result.structure)
         checkpoint = None
     else:
-        result, checkpoint = _design(options, out, controller)
+        result, checkpoint, controller = _design(options, out, controller)
     if out is not None:
         writing("--out", out, lambda: _write(result, out, controller))
     if checkpoint is not None:
@@ -136,8 +140,8 @@ def _refuse_design(ctx: click.Context) -> None:
 
 def _design(
     options: dict[str, Any], out: str | None, controller: dict[str, Any]
-) -> tuple[GainTable, Checkpoint | None]:
-    """Return the table that the options ask for, and where its designs are kept."""
+) -> tuple[GainTable, Checkpoint | None, dict[str, Any]]:
+    """Return the table that the options ask for, where its designs are kept, and its units."""
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.base.workers import open_executor
     from drillctrl.drilling.structures import preset_structure
@@ -155,7 +159,10 @@ def _design(
     if smooth and not isinstance(objective, Exact):
         raise InputError("smooth", smooth, f"0 with --objective {objective.name}")
     grid = read_grid(options)
-    structure = preset_structure(options["structure"]).with_bounds(read_bounds(options["bound"]))
+    structure = preset_structure(options["structure"])
+    scales = gain_scales(structure, grid.plant, grid.rig)
+    structure = structure.with_bounds(read_bounds(options["bound"], structure, scales))
+    controller = _in_units(controller, grid)
     _check_out(out, controller, grid, structure)
     with (
         open_executor(workers or 1, scheduler) as executor,
@@ -175,7 +182,24 @@ def _design(
             checkpoint=checkpoint,
             progress=progress,
         )
-    return result, checkpoint
+    return result, checkpoint, controller
+
+
+def _in_units(controller: dict[str, Any], grid: Grid) -> dict[str, Any]:
+    """Return what was typed of a controller in the units of its table."""
+    from drillctrl.base import units
+
+    rig = grid.rig
+    scales = {
+        "period": (units.TIME, None if rig is None else rig.time_scale),
+        "limit": (units.TORQUE, None if rig is None else rig.torsional_stiffness),
+    }
+    read = {
+        name: read_quantity(f"--{name}", controller[name], *scale)
+        for name, scale in scales.items()
+        if controller[name] is not None
+    }
+    return {**controller, **read}
 
 
 def _check_out(

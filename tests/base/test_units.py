@@ -28,6 +28,27 @@ EXPECTED = [
     ("938 N*m/rad", units.TORSIONAL_STIFFNESS, 938.0),
     ("116 kg*m^2", units.INERTIA, 116.0),
     ("0.6", units.NUMBER, 0.6),
+    ("10 t", units.FORCE, 98066.5),
+    ("10 tonne", units.FORCE, 98066.5),
+    ("34 tonne", units.MASS, 34000.0),
+    ("2 short_ton", units.MASS, 1814.36948),
+    ("22 klbs", units.FORCE, 97860.87553573),
+    ("22 klb", units.FORCE, 97860.87553573),
+    ("500 lb", units.MASS, 226.796185),
+    ("500 kg", units.FORCE, 4903.325),
+    ("1000 ft-lb", units.TORQUE, 1355.8179483314),
+    ("1000 lbf-ft", units.TORQUE, 1355.8179483314),
+    ("1 kft-lbs", units.TORQUE, 1355.8179483314),
+    ("5 kN.m", units.TORQUE, 5e3),
+    ("120 1/min", units.ROTARY_SPEED, 4 * math.pi),
+    ("120 min^-1", units.ROTARY_SPEED, 4 * math.pi),
+    ("100 fph", units.SPEED, 30.48 / 3600),
+    ("12 1/4 in", units.LENGTH, 0.31115),
+    ("12-1/4 in", units.LENGTH, 0.31115),
+    ('8 1/2"', units.LENGTH, 0.2159),
+    ("3/4 in", units.LENGTH, 0.01905),
+    ("1.2 sg", units.DENSITY, 1200.0),
+    ("100 lb/in", units.STIFFNESS, 100 * 4.4482216152605 / 0.0254),
 ]
 
 
@@ -42,8 +63,10 @@ def test_units_of_the_field_are_understood(text, dimension, value):
         ("12 kg", units.ROTARY_SPEED),
         ("2 Hz", units.ROTARY_SPEED),
         ("120", units.ROTARY_SPEED),
-        ("20 klbs", units.FORCE),
-        ("20 klb", units.FORCE),
+        ("20 kn", units.FORCE),
+        ("3 kg", units.TORQUE),
+        ("12 1/0 in", units.LENGTH),
+        ("12 1/4 kN", units.FORCE),
         ("30 bbl", units.LENGTH),
         ("", units.SPEED),
         ("fast", units.SPEED),
@@ -58,6 +81,22 @@ def test_units_of_the_field_are_understood(text, dimension, value):
 def test_what_is_no_such_quantity_is_refused(text, dimension):
     with pytest.raises(InputError, match="^x = "):
         units.to_si("x", text, dimension)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "readings"),
+    [
+        ("34 ton", units.MASS, ("tonne", "short_ton")),
+        ("10 tons", units.FORCE, ("tonne", "short_ton")),
+        ("20 mph", units.SPEED, ("m/h", "mile/h")),
+        ("22 Mlbs", units.FORCE, ("thousand", "million")),
+    ],
+)
+def test_what_drillers_read_in_two_ways_is_refused_with_both(text, dimension, readings):
+    with pytest.raises(InputError) as error:
+        units.to_si("x", text, dimension)
+    assert text in str(error.value)
+    assert all(reading in str(error.value) for reading in readings)
 
 
 @given(st.floats(1e-6, 1e6))

@@ -1,0 +1,43 @@
+"""Numbers on the command line that carry a unit where a rig is given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from drillctrl.base.errors import InputError
+
+if TYPE_CHECKING:
+    from drillctrl.base.units import Dimension
+
+
+def read_quantity(option: str, text: str, dimension: Dimension, unit: float | None) -> float:
+    """Return a number: SI where a rig's unit is known, else dimensionless.
+
+    Parameters
+    ----------
+    option, text : str
+        What was typed, and where.
+    dimension : Dimension
+        What it has to be.
+    unit : float or None
+        SI value of one dimensionless unit; None without a rig.
+
+    Raises
+    ------
+    InputError
+        If there is a unit without a rig, or none with one: a bare number could be meant in
+        SI or dimensionless. Zero is zero in both.
+    """
+    from drillctrl.base import units
+
+    try:
+        bare = float(text)
+    except ValueError:
+        if unit is None:
+            wanted = "a dimensionless number, or a rig to go with its unit"
+            raise InputError(option, text, wanted) from None
+        return units.to_si(option, text, dimension)
+    if unit is None or bare == 0.0:
+        return bare
+    both = f"'{text} {dimension.unit}', or '{bare * unit:.6g} {dimension.unit}'"
+    raise InputError(option, text, f"given with its unit: {both} for the dimensionless {text}")
