@@ -52,6 +52,7 @@ from .drilling.friction import Stribeck as Stribeck
 from .drilling.plant import Plant as Plant
 from .drilling.plant import paper_plant as paper_plant
 from .drilling.plant import top_drive_plant as top_drive_plant
+from .drilling.plausibility import plausibility_notes as plausibility_notes
 from .drilling.point import OperatingPoint as OperatingPoint
 from .drilling.point import RigPoint as RigPoint
 from .drilling.rig import Rig as Rig

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.units import Dimension
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
+from drillctrl.drilling.steady import steady_state
 
 # Permitted range and symbol of each dimensionless group.
 GROUPS = {
@@ -24,6 +25,7 @@ GROUPS = {
 RIG_AXES: dict[str, tuple[str, Dimension, str]] = {
     "speed": ("rpm", units.ROTARY_SPEED, "rotary speed"),
     "rop": ("m/h", units.SPEED, "rate of penetration"),
+    "wob": ("kN", units.FORCE, "weight on bit"),
     "rock_strength": ("MPa", units.STRESS, "rock strength ε"),
 }
 
@@ -64,7 +66,7 @@ def make_axis(
     Parameters
     ----------
     given : Axis or sequence
-        Limits are numbers; for rig axes numbers in rpm, m/h or MPa, or texts with a unit.
+        Limits are numbers; for rig axes numbers in rpm, m/h, kN or MPa, or texts with a unit.
     structure : FeedbackStructure or None
         Whose gains may be axes.
     case : Case
@@ -100,6 +102,10 @@ def make_axis(
         unit, dimension, word = RIG_AXES[name]
         label = f"{word}, {unit}"
         low, high = (_in_unit(name, v, unit, dimension) for v in (low, high))
+        if name == "wob" and case.rig_point is not None:
+            # The wear flat carries this much before anything is cut.
+            idle = steady_state(replace(case.rig_point, penetration_rate=0.0)).weight_on_bit
+            floor = units.from_si(idle, dimension, unit)
     low = checked_number(f"{name} (lower limit)", low, floor, ceiling)
     high = checked_number(f"{name} (upper limit)", high, floor, ceiling)
     if not low < high:

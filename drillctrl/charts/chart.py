@@ -164,7 +164,8 @@ def chart(
     x, y : (name, low, high)
         A group (``"omega0"``, ``"delta0"``, ``"psi"``, ``"eta"``, ``"xi"``, ``"kappa"``,
         ``"damping"``), a gain (``"K1_1"``, …), and for a rig ``"speed"`` in rpm, ``"rop"``
-        in m/h, ``"rock_strength"`` in MPa. ω0 may begin at 0, which itself is excluded.
+        in m/h, ``"wob"`` in kN, ``"rock_strength"`` in MPa. ω0 may begin at 0, which itself
+        is excluded.
     structure : str or FeedbackStructure, optional
         What is fed back; without it, the open loop.
     K1, K2 : array_like, optional

@@ -84,7 +84,7 @@ def plane_title(plane: Plane) -> str:
         return head
     held = {
         "omega0": (f"$\\omega_0$ = {point.omega0:g}", {"speed"}),
-        "delta0": (f"$\\delta_0$ = {point.delta0:g}", {"speed", "rop", "rock_strength"}),
+        "delta0": (f"$\\delta_0$ = {point.delta0:g}", {"speed", "rop", "wob", "rock_strength"}),
         "psi": (f"$\\psi$ = {point.psi:.4g}", {"rock_strength"}),
         "xi": (f"$\\xi$ = {point.xi:.3g}", {"damping"}),
         "kappa": (f"$\\kappa$ = {point.kappa:.3g}", {"damping"}),

@@ -20,6 +20,7 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.loops import gains_along, loop_arrays
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.steady import rig_point_at_weight_on_bit
 from drillctrl.drilling.structures import as_structure
 
 AxisLike = Axis | Sequence[object]
@@ -81,9 +82,10 @@ class Plane:
         rig = point.rig
         if "rock_strength" in si:
             rig = rig.with_rock_strength(si["rock_strength"])
-        return RigPoint(
-            rig, si.get("speed", point.rotary_speed), si.get("rop", point.penetration_rate)
-        ).operating_point()
+        speed = si.get("speed", point.rotary_speed)
+        if "wob" in si:
+            return rig_point_at_weight_on_bit(rig, speed, si["wob"]).operating_point()
+        return RigPoint(rig, speed, si.get("rop", point.penetration_rate)).operating_point()
 
     def _gains(self, values: dict[str, FloatArray], count: int) -> tuple[FloatArray, FloatArray]:
         """Return K1 and K2 of every place, each (N, m, p)."""
@@ -126,11 +128,12 @@ def check_plane(plane: Plane) -> None:
         If both axes set the same parameter.
     """
     sets = {"damping": ("xi", "kappa"), "speed": ("omega0", "delta0"), "rop": ("delta0",)}
-    sets["rock_strength"] = ("psi", "delta0")
+    sets["rock_strength"], sets["wob"] = ("psi", "delta0"), ("delta0",)
     first = set(sets.get(plane.x.name, (plane.x.name,)))
     second = set(sets.get(plane.y.name, (plane.y.name,)))
     both_rig = plane.x.name in RIG_AXES and plane.y.name in RIG_AXES
-    if plane.x.name == plane.y.name or (first & second and not both_rig):
+    weight_twice = {plane.x.name, plane.y.name} == {"rop", "wob"}
+    if plane.x.name == plane.y.name or weight_twice or (first & second and not both_rig):
         raise InputError("y", plane.y.name, f"another parameter than x = {plane.x.name}")
 
 

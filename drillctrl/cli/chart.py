@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from drillctrl.charts.volume import StabilityVolume
     from drillctrl.drilling.point import OperatingPoint, RigPoint
 
+_UNITS = {"speed": "rpm", "rop": "m/h", "wob": "kN"}
 MESH_ENDINGS = (".vtk", ".ply", ".stl")
 
 
@@ -59,9 +60,14 @@ def _with_axes(point: dict[str, Any], *axes: tuple[str, object, object]) -> dict
     """Return the options of the point, those that are axes at the upper end of theirs."""
     given = dict(point)
     for name, _, high in axes:
-        free = name == "speed" or (name == "rop" and given.get("wob") is None)
-        if given.get("rig") is not None and free and given[name] is None:
-            given[name] = high
+        if given.get("rig") is None or name not in ("speed", "rop", "wob"):
+            continue
+        other = {"rop": "wob", "wob": "rop"}.get(name)
+        if other is not None and point.get(other) is not None:
+            raise InputError(f"--{other}", point[other], f"left out where {name} is an axis")
+        # Two axes that contradict each other are told as such later.
+        if given[name] is None and (other is None or given[other] is None):
+            given[name] = high if isinstance(high, str) else f"{high} {_UNITS[name]}"
     return given
 
 
@@ -115,7 +121,7 @@ def chart_command(
 
     \b
     Axes: omega0, delta0, psi, eta, xi, kappa, damping; gains such as K1_1;
-    with --rig also speed (rpm), rop (m/h) and rock_strength (MPa).
+    with --rig also speed (rpm), rop (m/h), wob (kN), rock_strength (MPa).
 
     \b
     Examples:

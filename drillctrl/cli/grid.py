@@ -79,6 +79,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
 
 def _rig_grid(given: dict[str, str]) -> Grid:
     from drillctrl.base import units
+    from drillctrl.drilling.plausibility import plausibility_notes
     from drillctrl.strings.files import load_rig
     from drillctrl.tables.grid import rig_grid
 
@@ -100,7 +101,12 @@ def _rig_grid(given: dict[str, str]) -> Grid:
         if option in given
     }
     speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
-    return rig_grid(load_rig(given["rig"]), speed, **axes)
+    grid = rig_grid(load_rig(given["rig"]), speed, **axes)
+    points = [case.rig_point for case in grid.cases]
+    notes = dict.fromkeys(n for p in points if p is not None for n in plausibility_notes(p))
+    for note in list(notes)[:3]:
+        click.echo(f"drillctrl: note: {note}", err=True)
+    return grid
 
 
 def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:

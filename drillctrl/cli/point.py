@@ -92,6 +92,7 @@ def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
 
 def _rig_point(given: dict[str, Any]) -> RigPoint:
     from drillctrl.base import units
+    from drillctrl.drilling.plausibility import plausibility_notes
     from drillctrl.drilling.point import RigPoint
     from drillctrl.drilling.steady import rig_point_at_weight_on_bit
     from drillctrl.strings.files import load_rig
@@ -112,7 +113,10 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     if "rop" in given and units.to_si("--rop", given["rop"], units.SPEED) < 0.0:
         raise InputError("--rop", given["rop"], "at least 0 m/h")
     if "wob" in given:
-        return rig_point_at_weight_on_bit(
-            rig, speed, units.to_si("--wob", given["wob"], units.FORCE)
-        )
-    return RigPoint(rig, speed, units.to_si("--rop", given["rop"], units.SPEED))
+        weight = units.to_si("--wob", given["wob"], units.FORCE)
+        point = rig_point_at_weight_on_bit(rig, speed, weight)
+    else:
+        point = RigPoint(rig, speed, units.to_si("--rop", given["rop"], units.SPEED))
+    for note in plausibility_notes(point):
+        click.echo(f"drillctrl: note: {note}", err=True)
+    return point

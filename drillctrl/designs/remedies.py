@@ -8,17 +8,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structure
+from drillctrl.spectrum.pseudospectral import degree_for
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.reach import Reach, searched_reach
 
 # How much faster the bit is let turn, and in how many steps that is looked at.
 _FASTEST = 4.0
 _STEPS = 40
 _BISECTIONS = 30
+_CONTROLLED_STEPS = 8
+_CONTROLLED_BISECTIONS = 5
 
 _Range = tuple[float, float]
 
@@ -30,9 +36,9 @@ class Remedy:
     Attributes
     ----------
     kind : {"structure", "feed", "speed"}
-        Other torque feedback; an axial actuator; faster rotation without feedback.
+        Other torque feedback; an axial actuator; faster rotation.
     name : str
-        Of the structure; ``"none"`` for rotation alone.
+        Of the structure; ``"none"`` for rotation without feedback.
     result : Analysis
         The stable loop, with its point and gains.
     """
@@ -52,7 +58,7 @@ class Remedy:
         assert found.point is not None
         return {
             "kind": self.kind,
-            "structure": None if self.kind == "speed" else self.name,
+            "structure": None if found.structure is None else self.name,
             "omega0": found.point.omega0,
             "delta0": found.point.delta0,
             "K1": found.K1.ravel().tolist(),
@@ -66,8 +72,8 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
 
     Tried are the presets that allow more than the structure, within the paper's bounds, the
     feed alone and beside the structure, and faster rotation at the same rate of penetration
-    without feedback. Each that is returned has been designed and its roots counted; that one is
-    missing proves nothing.
+    with the structure asked for and without feedback. Each that is returned has been designed
+    and its roots counted; that one is missing proves nothing.
 
     Parameters
     ----------
@@ -90,8 +96,14 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
         result = design(failed.case, candidate, trials=False)
         if result.stable:
             found.append(Remedy(kind, candidate.name, result))
-    faster = _stable_speed(failed)
-    return tuple(found) if faster is None else (*found, Remedy("speed", "none", faster))
+    alone = _stable_speed(failed)
+    most = _FASTEST if alone is None or alone.point is None else alone.point.omega0
+    if alone is not None:
+        most /= failed.point.omega0
+    controlled = _controlled_speed(failed, most)
+    if controlled is not None:
+        found.append(Remedy("speed", failed.structure.name, controlled))
+    return tuple(found) if alone is None else (*found, Remedy("speed", "none", alone))
 
 
 def _candidates(failed: Design) -> Iterator[tuple[str, FeedbackStructure]]:
@@ -134,14 +146,56 @@ def _ranges(structure: FeedbackStructure) -> dict[tuple[str, str, str], _Range]:
     }
 
 
-def _stable_speed(failed: Design) -> Analysis | None:
-    """Return the open loop at the lowest higher speed found at which it is stable."""
+def _faster(failed: Design, factor: float) -> OperatingPoint:
+    """Return a faster point: at the same rate of penetration the bit cuts less in each turn."""
     point = failed.point
     assert point is not None
+    return point.with_changes(omega0=point.omega0 * factor, delta0=point.delta0 / factor)
+
+
+def _controlled_speed(failed: Design, most: float) -> Design | None:
+    """Return a design with the same structure at the lowest higher speed at which one is found.
+
+    The gains are followed from speed to speed by descent, so a lower one may exist.
+    """
+    structure = failed.structure
+    assert structure is not None
+    gains = structure.vector(failed.K1, failed.K2)
+
+    def reach(factor: float, known: FloatArray) -> Reach:
+        plant = failed.case.at(_faster(failed, factor)).system(structure.inputs)
+        family = loop_family(plant, structure, degree_for(plant) + 3)
+        return searched_reach(family, 0.0, [known], everywhere=False)
+
+    low, high, stable = 1.0, most, None
+    # Clearly below the speed that needs no feedback at all.
+    for factor in np.geomspace(1.0, most, _CONTROLLED_STEPS + 1)[1:-1].tolist():
+        there = reach(factor, gains)
+        gains = there.gains
+        if there.margin < 0.0:
+            high, stable = factor, gains
+            break
+        low = factor
+    if stable is None:
+        return None
+    for _ in range(_CONTROLLED_BISECTIONS):
+        middle = 0.5 * (low + high)
+        there = reach(middle, stable)
+        if there.margin < 0.0:
+            high, stable = middle, there.gains
+        else:
+            low = middle
+    chosen = min(1.01 * high, most)
+    point = _with_rig(failed, _faster(failed, chosen), chosen)
+    result = design(failed.case.at(point), structure, trials=False)
+    return result if result.stable else None
+
+
+def _stable_speed(failed: Design) -> Analysis | None:
+    """Return the open loop at the lowest higher speed found at which it is stable."""
 
     def at(factor: float) -> OperatingPoint:
-        # The same rate of penetration: a faster bit cuts less in each turn.
-        return point.with_changes(omega0=point.omega0 * factor, delta0=point.delta0 / factor)
+        return _faster(failed, factor)
 
     def alpha(factor: float) -> float:
         return spectral_abscissa(failed.case.at(at(factor)).system(()))

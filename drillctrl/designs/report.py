@@ -207,13 +207,14 @@ def _remedy_lines(design: Design, found: tuple[Remedy, ...]) -> Lines:
         alpha = f"α = {remedy.spectral_abscissa:.4g}"
         if remedy.kind == "speed":
             faster = _speed_text(remedy.result)
-            words.append(f"{faster} at this rate of penetration, no feedback: {alpha}")
+            feedback = "no feedback" if remedy.result.structure is None else remedy.name
+            words.append(f"{faster} at this rate of penetration, {feedback}: {alpha}")
         elif remedy.kind == "feed":
             words.append(f"an axial actuator, structure {remedy.name}: {alpha}")
         else:
             words.append(f"structure {remedy.name} within the paper's bounds: {alpha}")
     if not words:
-        tried = "richer presets, an axial actuator, up to four times the speed"
+        tried = "richer presets, an axial actuator, this structure and none up to 4 times the speed"
         return [("Would stabilise", f"nothing that was tried ({tried})")]
     return list(zip(["Would stabilise", *[""] * (len(words) - 1)], words, strict=True))
 

@@ -13,7 +13,9 @@ from drillctrl import (
     chart,
     count_right_of,
     preset_structure,
+    rig_point_at_weight_on_bit,
     spectral_abscissas,
+    steady_state,
     table1,
 )
 
@@ -268,3 +270,20 @@ def test_strip_without_lines_is_part_of_the_error(axes, level, strip):
     assert drawn.undecided_area == pytest.approx(strip)
     assert drawn.area_error >= drawn.undecided_area
     assert ("undecided" in drawn.summary()) == (strip > 0.0)
+
+
+def test_weight_on_bit_is_an_axis():
+    rig = table1()
+    rig_point = RigPoint(rig, 100 * np.pi / 30, 20 / 3600)
+    drawn = chart(rig_point, ("speed", 60.0, 300.0), ("wob", "20 kN", "6 t"))
+    assert drawn.plane.y.high == pytest.approx(6 * 9.80665)
+    points = np.concatenate([curve.points for curve in drawn.curves])
+    for speed, weight in points[:: len(points) // 6]:
+        # Steady weight on bit is that of the wear flat and grows in proportion to the rate.
+        place = rig_point_at_weight_on_bit(rig, speed * np.pi / 30, 1e3 * weight)
+        assert steady_state(place).weight_on_bit == pytest.approx(1e3 * weight)
+        assert spectral_abscissas(place)[0] == pytest.approx(0.0, abs=1e-7)
+    with pytest.raises(InputError, match=r"wob \(lower limit\) = 5.0: .* \[7.776"):
+        chart(rig_point, ("speed", 60.0, 300.0), ("wob", 5.0, 60.0))
+    with pytest.raises(InputError, match="another parameter than x = rop"):
+        chart(rig_point, ("rop", 1.0, 30.0), ("wob", 20.0, 60.0))

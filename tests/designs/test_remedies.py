@@ -9,14 +9,17 @@ from drillctrl import (
     OperatingPoint,
     RigPoint,
     analyze,
+    as_case,
     close_loop,
     design,
     dominant_roots,
     feed,
     plant_system,
     preset_structure,
+    soft_torque,
     spectral_abscissa,
     table1,
+    top_drive_plant,
 )
 from drillctrl.designs.remedies import remedies
 from drillctrl.designs.report import boundary_decision, report
@@ -134,3 +137,18 @@ def test_structures_that_do_not_combine_are_refused():
     with pytest.raises(InputError, match="not both 0"):
         feed(stiffness=0.0, damping=0.0)
     assert feed(preset_structure("pd")).gain_names == ("K1_1_1", "K1_1_2", "K1_2_3", "K1_2_4")
+
+
+@pytest.mark.parametrize("rpm", [60, 90])
+def test_more_speed_is_tried_with_the_structure_asked_for(rpm):
+    # A free top drive turns away without control: no speed is stable then.
+    point = RigPoint(table1(), rpm * math.pi / 30, 20 / 3600)
+    told = report(design(as_case(point, top_drive_plant(1.0)), soft_torque(), trials=False))
+    (remedy,) = told.remedies
+    assert (remedy.kind, remedy.name) == ("speed", "soft-torque")
+    assert remedy.result.stable
+    found = remedy.result.rig_point
+    assert found.penetration_rate == pytest.approx(point.penetration_rate)
+    # The axial motion, which a drive can hardly reach, is stable from 144.05 rpm on.
+    assert 144.05 < found.rotary_speed * 30 / math.pi < 1.03 * 144.05
+    assert "at this rate of penetration, soft-torque: α = " in told.summary()
