@@ -109,6 +109,9 @@ from .spectrum.trust import compare_spectra as compare_spectra
 from .spectrum.trust import intervals_for as intervals_for
 from .strings.catalogue import pipe as pipe
 from .strings.catalogue import pipe_names as pipe_names
+from .strings.check import Mode as Mode
+from .strings.check import RigCheck as RigCheck
+from .strings.check import check_rig as check_rig
 from .strings.drill_string import Damping as Damping
 from .strings.drill_string import DrillString as DrillString
 from .strings.exact import ExactLoop as ExactLoop

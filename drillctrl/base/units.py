@@ -60,6 +60,7 @@ TORSIONAL_DAMPING = Dimension(
 NUMBER = Dimension("a plain number", "", "'0.6'")
 DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
 LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")
+RATE = Dimension("a rate", "1/s", "'0.1 1/s'")
 TIME = Dimension("a time", "s", "'0.35 s' or '20 ms'")
 
 # The field's spellings that pint lacks or reads as something else (kNm: nautical miles).
@@ -106,7 +107,7 @@ _TURNS_A_MINUTE = ("1/min", "/min", "min^-1", "min⁻¹", "r/min")
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
 _FRACTION = r"(?:(?P<whole>\d{1,4})[ -])?(?P<over>\d{1,3})/(?P<under>\d{1,3})(?=[ \"'a-z])"
-_UNIT = r"(?:[A-Za-zµμ°²³()·*/ _.\-]|(?:\^|\*\*)-?[1-4](?![\d*^]))*|[\"']|1/min|min⁻¹"
+_UNIT = r"(?:[A-Za-zµμ°²³()·*/ _.\-]|(?:\^|\*\*)-?[1-4](?![\d*^]))*|[\"']|1/(?:min|s)|min⁻¹"
 
 
 @functools.cache

@@ -16,6 +16,7 @@ from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
 from drillctrl.cli.reproduce import reproduce_command
+from drillctrl.cli.rig import rig_command
 from drillctrl.cli.simulate import simulate_command
 from drillctrl.cli.table import table_command
 
@@ -40,6 +41,7 @@ for _command in (
     simulate_command,
     table_command,
     reproduce_command,
+    rig_command,
 ):
     cli.add_command(_command)
 

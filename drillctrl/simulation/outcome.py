@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 _SETTLED, _SETTLING, _FALLING = 1e-3, 2e-2, 0.7
 # Share of the imposed rate of penetration below which the bit does not keep up.
 _KEEPS_UP = 0.9
+# Mean weight on bit over the steady one beyond which the bit has fallen behind.
+_PRESSED = 2.0
 # Multiples of a rig's own scale of speed that no bounded motion of it reaches.
 _BEYOND, _LARGE = 20.0, 3.0
 _PER_STEP = 5
@@ -35,7 +38,8 @@ class Figures:
         ``"settles"``: steady drilling, reached or nearly so and still nearing;
         ``"orbit"``: a bounded motion, periodic or not, without stick and on the rock;
         ``"bounces"``: the bit leaves the rock; ``"stick-slip"``: it stands still at times;
-        ``"does-not-keep-up"``: it falls behind the feed of the top end; ``"stalls"``: it
+        ``"does-not-keep-up"``: it falls behind the feed of the top end, or has, so that the
+        string presses on it with more than twice the steady weight; ``"stalls"``: it
         stands still; ``"turns-back"``, ``"diverges"``; ``"undecided"``: the run ended for a
         numerical reason and proves nothing. All but the last three are of the last quarter.
     swing : float or None
@@ -97,11 +101,16 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
     The scale is the imposed rate and that with which the string springs back when the steady
     load on the bit is gone: twist T/Kt at the frequency of torsion, stretch W/Ka at that of
     the axial motion. Beyond a few times that, a run that broke off at its step limit grew if
-    its amplitude did from each quarter to the next.
+    its amplitude did from each quarter to the next. A bit that falls behind is loaded by what
+    it lags behind on the mean, so that its rates are judged by that load.
     """
     motion = run.motion if motion is None else motion
     weight, torque = run.steady_load
     p = run.point
+    if run.status == Status.DONE and run.model == "nonlinear":
+        # Of a linear motion, which swings to both sides, the mean says nothing.
+        mean = float(np.trapezoid(motion.x, motion.times)) / max(float(run.times[-1]), 1e-300)
+        weight += p.eta**2 * max(0.0, -mean)
     axial = p.penetration_rate + weight / p.eta if p.eta > 0.0 else np.inf
     for rate, limit in ((motion.dx, axial), (motion.dtheta, p.omega0 + torque)):
         sizes = [float(np.abs(rate[part]).max(initial=0.0)) for part in _quarters(motion.times)]
@@ -133,7 +142,9 @@ def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> 
     """Name a motion that goes on."""
     if stuck > 0.999:
         return Outcome.STALLS
-    if fed is not None and fed < _KEEPS_UP:
+    # What the feed pressed into the string before counts too, though the bit keeps up by now.
+    pressed = loads(run).weight_ratio
+    if fed is not None and (fed < _KEEPS_UP or (pressed is not None and pressed > _PRESSED)):
         return Outcome.LATE
     if stuck > 0.0:
         return Outcome.STICK_SLIP
@@ -153,7 +164,7 @@ def _settles(run: Simulation, tail: Motion) -> bool:
     whole = run.motion
     for name in ("dx", "dtheta"):
         now, largest = np.ptp(getattr(tail, name)), np.ptp(getattr(whole, name))
-        if now <= _SETTLED * largest:
+        if now <= max(_SETTLED * largest, run.resolved):
             continue
         earlier = np.ptp(getattr(third, name)[before]) if before.any() else 0.0
         if now > _SETTLING * largest or now > _FALLING * earlier:

@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base import units
+from drillctrl.simulation.loads import loads
+from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
-from drillctrl.simulation.status import Status
+from drillctrl.simulation.status import Outcome, Status
 
 if TYPE_CHECKING:
     from drillctrl.simulation.floquet import Floquet
+
+
+# Steps by which chattering is told, and how short they are then on the mean.
+_LAST_STEPS, _CHATTER = 10_000, 1e-3
 
 
 def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> dict[str, Any]:
@@ -34,6 +40,7 @@ def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> di
         "time_scale": None if run.rig is None else run.rig.time_scale,
         "saturated_fraction": _saturated(run),
         **summary,
+        **_judged(run),
     }
     if multipliers is not None:
         fields["multipliers"] = [
@@ -42,6 +49,60 @@ def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> di
         ]
         fields["multiplier_error"] = multipliers.trivial_error
     return fields
+
+
+def _judged(run: Simulation) -> dict[str, Any]:
+    """Return what became of the motion, in the words and figures that trials use as well."""
+    found = figures(run)
+    known = {
+        name: value if value is None or math.isfinite(value) else None
+        for name, value in loads(run).to_dict().items()
+    }
+    return {"outcome": found.outcome, "swing": found.swing, "feed": found.feed, **known}
+
+
+def _outcome_text(run: Simulation) -> str:
+    """Return what became of the motion in one line."""
+    found = figures(run)
+    parts = [found.outcome.sentence]
+    if found.swing is not None and found.outcome is not Outcome.SETTLES:
+        parts.append(f"swing {found.swing:.3g}")
+    if found.feed is not None and found.outcome is not Outcome.SETTLES:
+        parts.append(f"{found.feed:.1%} of the feed")
+    return ", ".join(parts)
+
+
+def _load_lines(run: Simulation) -> list[tuple[str, str]]:
+    """Return weight and torque beside the steady ones, and the share off the rock."""
+    found = loads(run)
+    lines = []
+    for word, mean, peak in (
+        ("Weight", found.weight_ratio, found.weight_peak),
+        ("Torque", found.torque_ratio, found.torque_peak),
+    ):
+        if mean is not None:
+            lines.append((word, f"{mean:.3g} of that of steady drilling, at most {peak:.3g}"))
+    if found.off_rock_fraction:
+        lines.append(("", f"off the rock for {found.off_rock_fraction:.1%} of the time"))
+    return lines
+
+
+def _chatter_lines(run: Simulation) -> list[tuple[str, str]]:
+    """Say that gains act like a relay, where that used up the steps."""
+    last = np.diff(run.times)[-_LAST_STEPS:]
+    if run.status != Status.STEP_LIMIT or run.controller is None or not last.size:
+        return []
+    if float(last.mean()) > _CHATTER:
+        return []
+    return [
+        ("", f"the last {last.size} steps are {last.mean():.1g} long: gains this high act like"),
+        ("", "a relay and chatter; a sampling period or lower gains would end that"),
+    ]
+
+
+def _near_zero(value: float, scale: float) -> float:
+    """Return 0 for what is rounding beside a scale."""
+    return 0.0 if abs(value) <= scale else value
 
 
 def _saturated(run: Simulation) -> float:
@@ -70,10 +131,10 @@ def _resting(run: Simulation) -> bool:
 
 
 def _ended(run: Simulation) -> str:
-    """Say how the run ended, and why if it broke off."""
+    """Say how the run ended, and when if it broke off."""
     if run.status == Status.DONE:
         return str(run.status)
-    return f"{run.status} at {run.times[-1]:.6g}: {run.status.sentence}"
+    return f"{run.status} at {run.times[-1]:.6g}"
 
 
 def _seconds(run: Simulation, time: float) -> str:
@@ -83,11 +144,12 @@ def _seconds(run: Simulation, time: float) -> str:
 def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> str:
     """Return the summary of a run for people, in rig units too where it was of a rig."""
     s, p, rig = run.summary, run.point, run.rig
+    least, most = (_near_zero(v, 1e-9 * p.omega0) for v in (s.bit_speed_min, s.bit_speed_max))
+    lowest, highest = (_near_zero(v, run.resolved) for v in (s.axial_min, s.axial_max))
     speed = ""
     if rig is not None:
         low, high = (
-            units.from_si(v / rig.time_scale, units.ROTARY_SPEED, "rpm")
-            for v in (s.bit_speed_min, s.bit_speed_max)
+            units.from_si(v / rig.time_scale, units.ROTARY_SPEED, "rpm") for v in (least, most)
         )
         speed = f" = {low:.4g} to {high:.4g} rpm"
     if s.settled:
@@ -109,6 +171,9 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
         ("Run", f"{run.model} model, {run.duration:g} time units"
          f"{_seconds(run, run.duration)}, {_ended(run)}"),
+        *([] if run.status == Status.DONE else [("", str(run.status.sentence))]),
+        *_chatter_lines(run),
+        ("Outcome", _outcome_text(run)),
         ("Motion", motion),
         ("", ", ".join(kinds) if kinds else "no stick, contact kept"),
     ]  # fmt: skip
@@ -116,8 +181,9 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         values = ", ".join(_complex(value) for value in multipliers.multipliers[:5])
         lines.append(("Multipliers", f"{values} (1 found within {multipliers.trivial_error:.0e})"))
     lines += [
-        ("Bit speed", f"{s.bit_speed_min:.6g} to {s.bit_speed_max:.6g}{speed}"),
-        ("Axial", f"x from {s.axial_min:.6g} to {s.axial_max:.6g}{_millimetres(run)}"),
+        ("Bit speed", f"{least:.6g} to {most:.6g}{speed}"),
+        ("Axial", f"x from {lowest:.6g} to {highest:.6g}{_millimetres(run, lowest, highest)}"),
+        *_load_lines(run),
         ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
     ]
     if run.controller is not None:
@@ -133,12 +199,10 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
 
 
-def _millimetres(run: Simulation) -> str:
+def _millimetres(run: Simulation, *axial: float) -> str:
     if run.rig is None:
         return ""
-    low, high = (
-        1e3 * run.rig.axial_scale * x for x in (run.summary.axial_min, run.summary.axial_max)
-    )
+    low, high = (1e3 * run.rig.axial_scale * x for x in axial)
     return f" = {low:.4g} to {high:.4g} mm"
 
 

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Errors of single steps add up.
+_RESOLVED = 100.0
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Simulation(Trace):
     """A finished run: its trace, and what it was asked for.
@@ -47,6 +51,11 @@ class Simulation(Trace):
     rejected: int
     evaluations: int
     rig: Rig | None = field(default=None, repr=False)
+
+    @property
+    def resolved(self) -> float:
+        """Amplitude of x and θ below which the motion is error of the integration."""
+        return _RESOLVED * self.atol
 
     def in_rig_units(self, times: npt.ArrayLike | None = None) -> RigMotion:
         """Return the motion of a rig in SI units.
@@ -90,7 +99,7 @@ class Simulation(Trace):
     @functools.cached_property
     def summary(self) -> Summary:
         """Figures of the motion over the last quarter of the run."""
-        return summarise(self)
+        return summarise(self, self.resolved)
 
     def plot(self) -> Figure:
         """Draw axial motion, bit speed and control over time; see `plot_motion`."""

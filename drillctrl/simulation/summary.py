@@ -25,7 +25,8 @@ class Summary:
     Attributes
     ----------
     settled : bool
-        Whether the largest |x| and |θ| are below 1e-3 of their largest over the whole run.
+        Whether the largest |x| and |θ| are below 1e-3 of their largest over the whole run, or
+        below what the integration resolves.
     stick_fraction : float
         Share of the time in torsional stick.
     period : float or None
@@ -71,8 +72,16 @@ class Summary:
         return asdict(self)
 
 
-def summarise(simulation: Trace) -> Summary:
-    """Return the figures of a run."""
+def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
+    """Return the figures of a run.
+
+    Parameters
+    ----------
+    simulation : Trace
+        A run.
+    resolved : float
+        Amplitude below which it says nothing.
+    """
     end = float(simulation.times[-1])
     since = 0.75 * end
     inputs = simulation.input_names
@@ -83,7 +92,8 @@ def summarise(simulation: Trace) -> Summary:
         # The run is in order of time; its tail starts with the step that holds `since`.
         tail = simulation.on_steps(PER_STEP, since, ("x", "theta", "dtheta", "delay", "contact"))
     settled = all(
-        float(abs(getattr(tail, name)).max()) <= SETTLED * float(abs(getattr(run, name)).max())
+        float(abs(getattr(tail, name)).max())
+        <= max(SETTLED * float(abs(getattr(run, name)).max()), resolved)
         for name in ("x", "theta")
     )
     omega0 = simulation.point.omega0

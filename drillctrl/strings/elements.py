@@ -30,10 +30,13 @@ class Chain(NamedTuple):
         Of M, C and K.
     beside : array, (3, N − 1)
         The same above the diagonal.
+    height : array, (N,)
+        Of every node above the bit, m.
     """
 
     diagonal: FloatArray
     beside: FloatArray
+    height: FloatArray
 
     def bit_receptance(self, s: ComplexArray) -> ComplexArray:
         """Return the displacement of the bit per force on it, under an imposed top, (...)."""
@@ -76,7 +79,7 @@ def elements(line: Line, element_length: float = ELEMENT_LENGTH) -> Chain:
         diagonal[i, :-1] += own
         diagonal[i, 1:] += own
         beside[i] = cross
-    return Chain(diagonal, beside)
+    return Chain(diagonal, beside, np.concatenate([[0.0], np.cumsum(length)]))
 
 
 def _split(stretch: Stretch, element_length: float) -> list[Piece]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,37 +37,48 @@ _PARTS: dict[str, dict[str, Dimension | None]] = {
         "wearflat_length": units.LENGTH,
         "cutter_inclination": units.NUMBER,
         "friction_coefficient": units.NUMBER,
-        "bit_geometry": units.NUMBER,
+        "geometry": units.NUMBER,
     },
     "rock": {"strength": units.STRESS, "contact_strength": units.STRESS},
-    "top_drive": {"inertia": units.INERTIA},
-    "string": {
-        "tally": None,
-        "section": None,
-        "mud_density": units.DENSITY,
-        "hoisting_stiffness": units.STIFFNESS,
-        "torsional_damping": None,
-        "axial_damping": None,
-        "retardation": units.TIME,
+    "top_drive": {
+        "inertia": units.INERTIA,
+        "torque_limit": units.TORQUE,
+        "delay": units.TIME,
+        "lag": units.TIME,
     },
+    "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
+    "mud": {"density": units.DENSITY},
+    "hoisting": {"stiffness": units.STIFFNESS},
 }
-_LEFT_OUT = {
-    *("top_drive", "tally", "section", "mud_density", "hoisting_stiffness"),
-    *("torsional_damping", "axial_damping", "retardation"),
-}
+# What may be left out: whole tables, and keys of tables.
+_OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
+_OPTIONAL = ("torque_limit", "delay", "lag", "torsional", "axial", "kelvin_voigt")
+# Numbers in the unit that the format names.
+_BARE = ("blades", "torsional", "axial", "kelvin_voigt")
 _COLUMNS: dict[str, Dimension | None] = {
     "name": None,
     "type": None,
     "pipe": None,
     "joints": None,
+    "joint_length": units.LENGTH,
     "material": None,
     "length": units.LENGTH,
-    "od": units.LENGTH,
-    "id": units.LENGTH,
-    "tool_joint_od": units.LENGTH,
-    "tool_joint_id": units.LENGTH,
+    "outer_diameter": units.LENGTH,
+    "inner_diameter": units.LENGTH,
+    "tool_joint_outer_diameter": units.LENGTH,
+    "tool_joint_inner_diameter": units.LENGTH,
     "tool_joint_length": units.LENGTH,
     "weight": units.LINEAR_DENSITY,
+    "youngs_modulus": units.STRESS,
+    "shear_modulus": units.STRESS,
+    "density": units.DENSITY,
+}
+# As tallies are headed.
+_ALSO = {
+    "od": "outer_diameter",
+    "id": "inner_diameter",
+    "tool_joint_od": "tool_joint_outer_diameter",
+    "tool_joint_id": "tool_joint_inner_diameter",
 }
 
 
@@ -77,9 +89,10 @@ def load_rig(source: str | Path) -> Rig:
     ----------
     source : str or Path
         ``"table1"``, a string of `string_preset`, or the path of a file. The file either holds
-        the attributes of `Rig` as keys, each a text with a unit (``mass = "34 t"``), or tables
-        ``bit``, ``rock``, ``string`` and, if there is one, ``top_drive``. The string is a list
-        of sections, or the name of a CSV file beside it with the same columns.
+        the attributes of `Rig` as keys, each a text with a unit (``mass = "34 t"``), or a string:
+        ``[[sections]]`` from the top down, or ``sections`` as the name of a CSV file beside it
+        with the same columns; ``[bit]``, ``[rock]`` and, if they are there, ``[top_drive]``,
+        ``[damping]``, ``[mud]``, ``[hoisting]``.
 
     Raises
     ------
@@ -93,72 +106,79 @@ def load_rig(source: str | Path) -> Rig:
     if str(source) in LUMPED_PRESETS:
         return table1()
     data = read_toml(source, f"one of the presets {', '.join(presets)} or a readable TOML file")
-    if "string" not in data:
+    if "sections" not in data and not {"bit", "rock"} & set(data):
         return rig_from_mapping(data, str(source))
     return _string_rig(data, Path(source))
 
 
 def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
-    _check_keys(data, _PARTS, str(path))
+    _check_keys(data, ("sections", *_PARTS), str(path), _OPTIONAL_PARTS)
     found: dict[str, dict[str, Any]] = {}
     for part, known in _PARTS.items():
         given = data.get(part, {})
         if not isinstance(given, dict):
             raise InputError(f"{part} in {path}", given, f"a table, [{part}]")
         if part in data:
-            _check_keys(given, known, f"[{part}] of {path}")
+            _check_keys(given, known, f"[{part}] of {path}", _OPTIONAL)
         found[part] = {
-            key: value if known[key] is None else _si(f"{part}.{key} in {path}", value, known[key])
+            key: value
+            if known[key] is None
+            else _si(f"{part}.{key} in {path}", value, known[key], bare=key in _BARE)
             for key, value in given.items()
         }
-    bit, rock, string = found["bit"], found["rock"], found["string"]
+    bit, rock, drive = found["bit"], found["rock"], found["top_drive"]
     diameter = bit.pop("diameter")
     if diameter > _WIDEST:
         wanted = f"at most {_WIDEST:g} m: no hole is wider"
         raise InputError(f"bit.diameter in {path}", data["bit"]["diameter"], wanted)
+    for name in ("torque_limit", "delay", "lag"):
+        # Wrong in silence otherwise: a design would know nothing of it.
+        if drive.get(name):
+            wanted = "left out: drives have an inertia and nothing else so far"
+            raise InputError(f"top_drive.{name} in {path}", data["top_drive"][name], wanted)
+    given = found["damping"]
+    damping = Damping(**{
+        name: checked_number(f"damping.{key} in {path}", given[key], 0.0, 1e3)
+        for name, key in (("torsional", "torsional"), ("axial", "axial"),
+                          ("retardation", "kelvin_voigt"))
+        if key in given
+    })  # fmt: skip
+    mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
     return string_rig(
-        DrillString(
-            _sections(string, path),
-            Damping(**{
-                name: checked_number(f"string.{key} in {path}", string[key], 0.0, 1e3)
-                for name, key in (("torsional", "torsional_damping"), ("axial", "axial_damping"),
-                                  ("retardation", "retardation"))
-                if key in string
-            }),
-            string.get("mud_density", 0.0),
-            string.get("hoisting_stiffness"),
-        ),
-        drive_inertia=found["top_drive"].get("inertia"),
+        DrillString(_sections(data["sections"], path), damping, mud, ropes),
+        drive_inertia=drive.get("inertia"),
         bit_radius=0.5 * diameter,
+        bit_geometry=bit.pop("geometry"),
         rock_strength=rock["strength"],
         contact_strength=rock["contact_strength"],
         **bit,
-    )  # fmt: skip
+    )
 
 
-def _check_keys(given: Mapping[str, Any], known: Mapping[str, Any], where: str) -> None:
+def _check_keys(
+    given: Mapping[str, Any], known: Iterable[str], where: str, optional: Collection[str]
+) -> None:
+    names = list(known)
     for key in given:
-        if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1)
+        if key not in names:
+            near = difflib.get_close_matches(str(key), names, n=1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise InputError(f"key in {where}", key, f"one of {', '.join(known)}{hint}")
-    missing = [key for key in known if key not in given and key not in _LEFT_OUT]
+            raise InputError(f"key in {where}", key, f"one of {', '.join(names)}{hint}")
+    missing = [key for key in names if key not in given and key not in optional]
     if missing:
         raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
 
 
-def _sections(string: Mapping[str, Any], path: Path) -> tuple[Section, ...]:
-    if ("tally" in string) == ("section" in string):
-        wanted = "one of both: tally, the name of a CSV file, or [[string.section]]"
-        raise InputError(f"string in {path}", "both" if "tally" in string else "neither", wanted)
-    if "tally" in string:
-        return read_tally(path.parent / str(string["tally"]))
-    rows = string["section"]
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise InputError(f"string.section in {path}", rows, "tables, [[string.section]]")
+def _sections(given: Any, path: Path) -> tuple[Section, ...]:
+    if isinstance(given, str):
+        return read_tally(path.parent / given)
+    if not isinstance(given, list) or not given or not all(isinstance(r, dict) for r in given):
+        wanted = "tables, [[sections]], or the name of a CSV file"
+        raise InputError(f"sections in {path}", given, wanted)
     found = []
-    for i, row in enumerate(rows, 1):
-        found.append(_section({key.lower(): v for key, v in row.items()}, f"section {i} of {path}"))
+    for i, row in enumerate(given, 1):
+        named = {_ALSO.get(key.lower(), key.lower()): value for key, value in row.items()}
+        found.append(_section(named, f"section {i} of {path}"))
     return tuple(found)
 
 
@@ -168,10 +188,11 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
     Parameters
     ----------
     path : str or Path
-        With a header of ``name``, ``type`` or ``pipe`` (a name of `pipe_names`), ``joints`` or
-        ``length``, ``OD``, ``ID``, ``tool joint OD``, ``tool joint ID``, ``tool joint length``,
-        ``weight`` (per metre), ``material``, in any order. A unit stands behind a value, or
-        behind the column's name: ``OD [in]``.
+        With a header of ``name``, ``type`` or ``pipe`` (a name of `pipe_names`), ``length`` or
+        ``joints`` (and ``joint length``), ``outer diameter`` or ``OD``, ``inner diameter`` or
+        ``ID``, ``tool joint OD``, ``tool joint ID``, ``tool joint length``, ``weight`` (per
+        metre), ``material``, ``youngs modulus``, ``shear modulus``, ``density``, in any order.
+        A unit stands behind a value, or behind the column's name: ``OD [in]``.
 
     Raises
     ------
@@ -191,7 +212,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
     for title in table[0]:
         match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(](.*)[\])])?\s*", title)
         assert match is not None
-        names.append(re.sub(r"[\s\-]+", "_", match[1].strip().lower()))
+        name = re.sub(r"[\s\-]+", "_", match[1].strip().lower())
+        names.append(_ALSO.get(name, name))
         behind.append(match[2])
     for name, title in zip(names, table[0], strict=True):
         if name not in _COLUMNS:
@@ -232,29 +254,40 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
         number = float(row["joints"]) if str(row["joints"]).strip().isdigit() else row["joints"]
         joints = checked_integer(f"joints in {where}", number, 1, 10_000)
     if bought is not None:
-        value.setdefault("od", bought.outer_diameter)
-        value.setdefault("id", bought.inner_diameter)
-        value.setdefault("length", joints * bought.joint_length if "joints" in row else None)
-        if "joints" not in row and value["length"] is not None:
-            joints = max(1, round(value["length"] / bought.joint_length))
-    missing = [name for name in ("length", "od", "id") if value.get(name) is None]
+        value.setdefault("outer_diameter", bought.outer_diameter)
+        value.setdefault("inner_diameter", bought.inner_diameter)
+        value.setdefault("joint_length", bought.joint_length)
+    if "joint_length" in value:
+        if "joints" in row:
+            value.setdefault("length", joints * value["joint_length"])
+        elif "length" in value:
+            joints = max(1, round(value["length"] / value["joint_length"]))
+    needed = ("length", "outer_diameter", "inner_diameter")
+    missing = [name for name in needed if value.get(name) is None]
     if missing:
         raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
+    own = {
+        field: value[name]
+        for field, name in (
+            ("elasticity", "youngs_modulus"), ("shear", "shear_modulus"), ("density", "density")
+        )
+        if name in value
+    }  # fmt: skip
     return Section(
         str(row.get("name", row.get("pipe", kind))),
         kind,
         value["length"],
-        value["od"],
-        value["id"],
+        value["outer_diameter"],
+        value["inner_diameter"],
         _tool_joint(value, where) or (bought.tool_joint if bought else None),
         joints,
         value.get("weight"),
-        MATERIALS[material],
+        replace(MATERIALS[material], **own),
     )
 
 
 def _tool_joint(value: Mapping[str, Any], where: str) -> ToolJoint | None:
-    names = ("tool_joint_od", "tool_joint_id", "tool_joint_length")
+    names = ("tool_joint_outer_diameter", "tool_joint_inner_diameter", "tool_joint_length")
     given = [name for name in names if name in value]
     if not given:
         return None
@@ -264,8 +297,8 @@ def _tool_joint(value: Mapping[str, Any], where: str) -> ToolJoint | None:
     return ToolJoint(*(value[name] for name in names))
 
 
-def _si(name: str, value: Any, dimension: Dimension | None) -> float:
+def _si(name: str, value: Any, dimension: Dimension | None, *, bare: bool = False) -> float:
     assert dimension is not None
-    if dimension is units.NUMBER and not isinstance(value, str):
+    if (bare or dimension is units.NUMBER) and not isinstance(value, str):
         return checked_number(name, value)
     return units.to_si(name, value, dimension)

@@ -48,6 +48,7 @@ EXPECTED = [
     ('8 1/2"', units.LENGTH, 0.2159),
     ("3/4 in", units.LENGTH, 0.01905),
     ("1.2 sg", units.DENSITY, 1200.0),
+    ("0.1 1/s", units.RATE, 0.1),
     ("100 lb/in", units.STIFFNESS, 100 * 4.4482216152605 / 0.0254),
 ]
 

@@ -11,28 +11,31 @@ blades = 4
 wearflat_length = "1.2 mm"
 cutter_inclination = 0.6
 friction_coefficient = 0.6
-bit_geometry = 1.0
+geometry = 1.0
 
 [rock]
 strength = "60 MPa"
 contact_strength = "60 MPa"
 """
 STRING = """
-[string]
-mud_density = "10 ppg"
-torsional_damping = 0.2
+[mud]
+density = "10 ppg"
 
-[[string.section]]
+[damping]
+torsional = 0.2
+
+[[sections]]
 name = "upper pipe"
 pipe = '5" 19.5#'
 joints = 200
 
-[[string.section]]
+[[sections]]
 type = "collar"
 length = "500 ft"
-OD = "8 in"
-ID = "2 13/16 in"
+outer_diameter = "8 in"
+inner_diameter = "2 13/16 in"
 """
+TOP_DRIVE = '[top_drive]\ninertia = "2900 kg*m^2"\n'
 TALLY = """\
 name,type,joints,length [ft],OD [in],ID [in],tool joint OD [in],tool joint ID [in],\
 tool joint length,weight,material
@@ -48,7 +51,7 @@ def written(folder, text, name="rig.toml"):
 
 
 def test_sections_in_the_file(tmp_path):
-    text = BIT + STRING.replace("2 13/16 in", "2.8125 in")
+    text = BIT + STRING
     rig = load_rig(written(tmp_path, text))
     upper, collars = rig.string.sections
     assert upper.length == pytest.approx(200 * 9.6)
@@ -59,13 +62,13 @@ def test_sections_in_the_file(tmp_path):
     assert rig.string.damping.torsional == 0.2
     assert rig.bit_radius == pytest.approx(0.10795)
     assert rig.drive_inertia is None
-    driven = load_rig(written(tmp_path, text + '[top_drive]\ninertia = "2900 kg*m^2"\n'))
+    driven = load_rig(written(tmp_path, text + TOP_DRIVE))
     assert driven.drive_inertia == 2900.0
 
 
 def test_a_tally_beside_the_file(tmp_path):
     written(tmp_path, TALLY, "tally.csv")
-    rig = load_rig(written(tmp_path, BIT + '[string]\ntally = "tally.csv"\n'))
+    rig = load_rig(written(tmp_path, 'sections = "tally.csv"\n' + BIT))
     pipe, collars = rig.string.sections
     assert pipe.length == pytest.approx(3150 * 0.3048)
     assert pipe.joints == 100
@@ -84,8 +87,8 @@ def test_presets_are_rigs_too():
     ("change", "message"),
     [
         (("500 ft", "-500 ft"), "length of collar"),
-        (("OD =", "OOD ="), "key in section 2"),
-        (('ID = "2.8125 in"', 'ID = "9 in"'), "ID of collar = 228.6 mm"),
+        (("outer_diameter =", "outer_diametre ="), "key in section 2"),
+        (('inner_diameter = "2 13/16 in"', 'inner_diameter = "9 in"'), "ID of collar = 228.6 mm"),
         (("500 ft", "500 kg"), "length in section 2"),
         (("8.5 in", "85 in"), "bit.diameter"),
         (("joints = 200", "joints = 2.5"), "joints in section 1"),
@@ -93,11 +96,18 @@ def test_presets_are_rigs_too():
         (('type = "collar"', 'type = "color"'), "type in section 2"),
         (("[rock]", "[stone]"), "key in"),
         (('strength = "60 MPa"\ncontact', "contact"), "strength in"),
-        (("[[string.section]]", "[[string.sections]]"), "sections"),
+        (("[[sections]]", "[[section]]"), "key in"),
+        (
+            ("[mud]", '[top_drive]\ninertia = "2900 kg*m^2"\ndelay = "20 ms"\n[mud]'),
+            "top_drive.delay",
+        ),
+        (("torsional = 0.2", "torsional = -0.2"), "damping.torsional"),
+        (("torsional = 0.2", 'torsional = "0.2 s"'), "damping.torsional"),
+        (("geometry = 1.0", ""), "geometry in [bit]"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(tmp_path, change, message):
-    text = (BIT + STRING).replace("2 13/16 in", "2.8125 in")
+    text = BIT + STRING
     assert change[0] in text
     with pytest.raises(InputError) as caught:
         load_rig(written(tmp_path, text.replace(*change)))
@@ -114,7 +124,7 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, change, message):
         (TALLY.replace(",DC,,600", ",DC,600"), "cells"),
         (TALLY.replace("length [ft]", "length", 1), "length in row 2"),
         (TALLY.replace("31 kg/m", "31 kg"), "weight in row 2"),
-        (TALLY.replace(",3.75,", ",,"), "tool_joint_id in row 2"),
+        (TALLY.replace(",3.75,", ",,"), "tool_joint_inner_diameter in row 2"),
     ],
 )
 def test_a_wrong_tally_is_refused(tmp_path, text, message):

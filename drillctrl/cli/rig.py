@@ -1,0 +1,38 @@
+"""`drillctrl rig`."""
+
+from __future__ import annotations
+
+import click
+
+from drillctrl.cli.output import check_figure, json_text, write_figure
+from drillctrl.cli.verb import Verb
+
+
+@click.group(name="rig")
+def rig_command() -> None:
+    """Read rig files."""
+
+
+@rig_command.command(name="check", cls=Verb)
+@click.argument("source", metavar="FILE|PRESET")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--plot", type=click.Path(), help="Draw string and modes: FILE.png, .svg, .pdf.")
+def check_command(source: str, as_json: bool, plot: str | None) -> None:
+    """Say what is understood of a rig file: string, weights, lumped numbers, modes.
+
+    \b
+    Examples:
+      drillctrl rig check rig.toml --plot string.png
+      drillctrl rig check vertical-3000
+    """
+    check_figure(plot)
+    from drillctrl.strings.check import check_rig
+    from drillctrl.strings.files import load_rig
+    from drillctrl.strings.words import rig_summary
+
+    found = check_rig(load_rig(source))
+    if plot is not None:
+        from drillctrl.strings.figure import plot_rig
+
+        write_figure(plot, plot_rig(found))
+    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found))
