@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
+
 ROOT = Path(__file__).parents[1]
 BUILT = {"_build", "gallery", "reference"}
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -38,6 +40,14 @@ def page_jobs(text: str) -> Iterator[tuple[str, str]]:
             python = ""
 
 
+def verbs(group: click.Group, name: str) -> Iterator[tuple[str, click.Command]]:
+    """Yield every command below a group, and groups themselves, by the words that call it."""
+    for word, verb in sorted(group.commands.items()):
+        yield f"{name} {word}", verb
+        if isinstance(verb, click.Group):
+            yield from verbs(verb, f"{name} {word}")
+
+
 def sources() -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """Yield each place that shows commands, and what it shows."""
     pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md")))
@@ -46,11 +56,11 @@ def sources() -> Iterator[tuple[str, list[tuple[str, str]]]]:
             yield str(page.relative_to(ROOT)), list(page_jobs(page.read_text(encoding="utf-8")))
     from drillctrl.cli import cli
 
-    for name, verb in sorted(cli.commands.items()):
+    for name, verb in verbs(cli, "drillctrl"):
         examples = commands(verb.help or "")
         if not examples:
-            raise SystemExit(f"drillctrl {name} --help shows no example")
-        yield f"drillctrl {name} --help", [("sh", command) for command in examples]
+            raise SystemExit(f"{name} --help shows no example")
+        yield f"{name} --help", [("sh", command) for command in examples]
 
 
 def main() -> int:

@@ -10,7 +10,12 @@ from drillctrl.cli.verb import Verb
 
 @click.group(name="rig")
 def rig_command() -> None:
-    """Read rig files."""
+    """Read rig files.
+
+    \b
+    Examples:
+      drillctrl rig check vertical-3000
+    """
 
 
 @rig_command.command(name="check", cls=Verb)
@@ -22,8 +27,8 @@ def check_command(source: str, as_json: bool, plot: str | None) -> None:
 
     \b
     Examples:
-      drillctrl rig check rig.toml --plot string.png
-      drillctrl rig check vertical-3000
+      drillctrl rig check paper-string
+      drillctrl rig check vertical-3000 --plot string.png
     """
     check_figure(plot)
     from drillctrl.strings.check import check_rig
