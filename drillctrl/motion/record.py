@@ -1,0 +1,92 @@
+"""Sums over a run in windows: what a frequency holds of the torque, and how the bit met the rock."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.simulation.trace import Trace
+
+# Gauss points on each piece of a step; between two events all is smooth.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+class Halves(NamedTuple):
+    """Sums over successive halves of windows, h of them.
+
+    Attributes
+    ----------
+    tones : complex array, (h, 3)
+        Means of T e^(−iωt) times 1, e^(iνt) and e^(−iνt), with ν = 2π over the window.
+    weight, torque : array, (h,)
+        Mean loads on the bit.
+    held, lifted : array, (h,)
+        Shares of the time.
+    """
+
+    tones: ComplexArray
+    weight: FloatArray
+    torque: FloatArray
+    held: FloatArray
+    lifted: FloatArray
+
+
+def halves(run: Trace, since: float, half: float, frequency: float) -> Halves:
+    """Return the sums over all halves of windows that a run holds.
+
+    Parameters
+    ----------
+    run : Trace
+        A run.
+    since : float
+        Begin of the first, from which phases count.
+    half : float
+        Length of each, whole periods.
+    frequency : float
+        ω.
+    """
+    end = float(run.times[-1])
+    count = int(np.floor((end - since) / half + 1e-6))
+    edges = np.minimum(since + half * np.arange(count + 1), end)
+    inside = run.times[(run.times > since) & (run.times < edges[-1])]
+    corners = np.unique(np.concatenate([edges, inside]))
+    length = np.diff(corners)
+    times = corners[:-1, None] + 0.5 * length[:, None] * (_NODES + 1.0)
+    motion = run.at(times.ravel(), ("torque_on_bit", "weight_on_bit", "contact"))
+    share = 0.5 * length[:, None] * _WEIGHTS / half
+    torque, weight, contact, held = (
+        np.asarray(values).reshape(times.shape)
+        for values in (motion.torque_on_bit, motion.weight_on_bit, motion.contact, motion.held)
+    )
+    place = np.searchsorted(edges, 0.5 * (corners[:-1] + corners[1:]), side="right") - 1
+
+    def means(values: FloatArray) -> FloatArray:
+        return np.bincount(place, (share * values).sum(axis=1), minlength=count)
+
+    def tone(omega: float) -> ComplexArray:
+        phase = omega * (times - since)
+        return means(torque * np.cos(phase)) - 1j * means(torque * np.sin(phase))
+
+    beside = np.pi / half
+    tones = [tone(frequency), tone(frequency - beside), tone(frequency + beside)]
+    on_rock = contact.astype(float)
+    return Halves(
+        np.stack(tones, axis=1), means(weight), means(torque),
+        means((contact & held).astype(float)), means(1.0 - on_rock),
+    )  # fmt: skip
+
+
+def windowed(found: Halves) -> ComplexArray:
+    """Return the amplitude of T in e^(iωt) in windows that overlap by half, (h − 1,).
+
+    Each is weighed by 1 − cos, so that neither the mean nor the lines of the axial orbit,
+    which is in no whole ratio to ω, leak into it.
+    """
+    # From one half to the next the weight turns by π.
+    turn = (-1.0) ** np.arange(found.tones.shape[0])
+    plain = found.tones[:, 0]
+    beside = 0.5 * turn * (found.tones[:, 1] + found.tones[:, 2])
+    # Halves that begin a window, and those that end one.
+    return (plain - beside)[:-1] + (plain + beside)[1:]

@@ -1,0 +1,227 @@
+"""The torque with which a bit on its axial orbit answers a change of its speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.motion.record import Halves, halves, windowed
+from drillctrl.motion.turning import Turned
+from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.status import Status
+
+# H is told to this, in units of sqrt(I Kt), unless it takes too long.
+TOLERANCE = 3e-3
+MOST_PERIODS = 400
+# Axial kicks, over the rate of penetration, from which the orbit is reached: out of smooth
+# drilling, and off the rock.
+KICKS = (0.1, -2.0)
+# Periods of a half window, and half windows of a run that is gone on from.
+_PERIODS, _PER_RUN = 4, 10
+_SETTLING = 6.0
+_SHORTEST, _LONGEST = 60.0, 300.0
+_SURE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class BitResponse:
+    """The answer of a bit to Ω = Ω0 (1 + A cos ωt).
+
+    Attributes
+    ----------
+    frequency : float
+        ω.
+    amplitude : float
+        A, share of the rotary speed.
+    value : complex
+        H, amplitude of the torque on bit over that of the speed; a positive real part damps.
+        NaN where a run broke off. At −ω it is the conjugate.
+    error : float
+        Of |H|: twice the standard error of the mean over windows, or half the difference of
+        the two starts where that is more; infinite where a run broke off.
+    windows : complex array, (w,)
+        H in each window, those of one start after those of the other.
+    starts : complex array, (2,)
+        Means of each start. Where they differ by more than the scatter, there are two orbits.
+    weight, torque : float
+        Means of the loads on the bit.
+    held, lifted : float
+        Shares of the time: held at Z' = 0, and off the rock.
+    periods : int
+        Of ω, that were looked at.
+    status : Status
+        ``DONE``, or why a run broke off.
+    """
+
+    frequency: float
+    amplitude: float
+    value: complex
+    error: float
+    windows: ComplexArray = field(repr=False)
+    starts: ComplexArray = field(repr=False)
+    weight: float
+    torque: float
+    held: float
+    lifted: float
+    periods: int
+    status: Status
+
+    @property
+    def scatter(self) -> float:
+        """Largest distance of H in a window from its mean."""
+        return float(np.abs(self.windows - self.value).max(initial=0.0))
+
+
+def turned_case(where: Where, frequency: float) -> Case:
+    """Return the axial motion of a case under an imposed rotation, which θ' at t = 0 sets.
+
+    Raises
+    ------
+    InputError
+        If there is no plant, or nothing is cut.
+    """
+    case = as_case(where)
+    plant, point = case.physics("the response of a bit")
+    if not point.delta0 > 0.0:
+        raise InputError("delta0", point.delta0, "above 0: a bit that cuts nothing has no orbit")
+    turning = Turned(turning_frequency=frequency)
+    return Case(replace(plant, blocks=(*plant.blocks, turning)), point)
+
+
+def settling_time(case: Case) -> float:
+    """Return how long the axial orbit is waited for, by the damping of the string alone."""
+    axial = [0, 1, *range(4, case.motion().A.shape[0])]
+    slowest = -float(np.linalg.eigvals(case.motion().A[np.ix_(axial, axial)]).real.max())
+    return float(np.clip(_SETTLING / max(slowest, 1e-9), _SHORTEST, _LONGEST))
+
+
+def bit_response(
+    where: Where,
+    frequency: float,
+    amplitude: float,
+    *,
+    tolerance: float = TOLERANCE,
+    most_periods: int = MOST_PERIODS,
+    **options: Any,
+) -> BitResponse:
+    """Return the response H(iω, A) of a bit on its axial orbit.
+
+    The bit is turned at Ω0 (1 + A cos ωt), whatever the rock bears; only the axial motion is
+    simulated. When it has reached its orbit, the part of the torque at ω is taken over
+    windows of eight periods, from two starts.
+
+    Parameters
+    ----------
+    where : OperatingPoint, RigPoint or Case
+        What drills, and where.
+    frequency : float
+        ω > 0, dimensionless.
+    amplitude : float
+        A in (0, 1): the bit does not turn back.
+    tolerance : float
+        Error of H at which no more windows are looked at, in units of the torque per speed.
+    most_periods : int
+        So many periods of ω of each start are looked at where the error stays larger.
+    **options
+        ``cutting``, ``rtol`` and others of `simulate`.
+
+    Returns
+    -------
+    BitResponse
+        In dimensionless units.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range, there is no plant, or its axial and torsional
+        motion are coupled elsewhere than at the bit.
+    """
+    frequency = checked_number("frequency", frequency, 0.0, 1e3, open_low=True)
+    amplitude = checked_number("amplitude", amplitude, 0.0, 0.999, open_low=True)
+    tolerance = checked_number("tolerance", tolerance, 0.0, 1e6, open_low=True)
+    most_periods = checked_integer("most_periods", most_periods, 40, 1_000_000)
+    case = turned_case(where, frequency)
+    starts = [_Start(case, frequency, amplitude, kick, options) for kick in KICKS]
+    while True:
+        for start in starts:
+            start.go_on()
+        found = _response(starts, frequency, amplitude)
+        periods = found.periods // len(starts)
+        if found.status != Status.DONE or found.error <= tolerance or periods >= most_periods:
+            return found
+
+
+class _Start:
+    """A run from one axial kick, gone on from as long as asked, and its windows."""
+
+    def __init__(
+        self, case: Case, frequency: float, amplitude: float, kick: float, options: dict[str, Any]
+    ) -> None:
+        _, point = case.physics("the response of a bit")
+        self.case, self.frequency, self.options = case, frequency, options
+        self.speed = amplitude * point.omega0
+        period = 2.0 * math.pi / frequency
+        self.half = _PERIODS * period
+        self.wait = period * math.ceil(settling_time(case) / period)
+        initial = {"dx": kick * point.penetration_rate, "dtheta": self.speed}
+        self.scenario = Scenario(initial=initial)
+        self.found: list[Halves] = []
+        self.run: Simulation | None = None
+
+    def go_on(self) -> None:
+        """Look at some more windows."""
+        wait = self.wait if self.run is None else 0.0
+        scenario = self.scenario if self.run is None else Scenario(start=self.run.past())
+        duration = wait + _PER_RUN * self.half
+        self.run = simulate(self.case, duration=duration, scenario=scenario, **self.options)
+        if self.run.status == Status.DONE:
+            self.found.append(halves(self.run, wait, self.half, self.frequency))
+
+    @property
+    def every(self) -> Halves:
+        """All halves of windows."""
+        return Halves(*[np.concatenate(parts) for parts in zip(*self.found, strict=True)])
+
+    @property
+    def windows(self) -> ComplexArray:
+        """H in each window; each run lasts whole periods, and so each begins at phase 0."""
+        return windowed(self.every) / self.speed
+
+
+def _response(starts: list[_Start], frequency: float, amplitude: float) -> BitResponse:
+    """Return what the windows so far say."""
+    broken = [start.run.status for start in starts if start.run and start.run.status != Status.DONE]
+    if broken:
+        return BitResponse(
+            frequency, amplitude, complex(math.nan, math.nan), math.inf,
+            np.zeros(0, dtype=complex), np.full(len(starts), np.nan + 0j),
+            math.nan, math.nan, math.nan, math.nan, 0, broken[0],
+        )  # fmt: skip
+    by_start = [start.windows for start in starts]
+    windows = np.concatenate(by_start)
+    means = np.array([each.mean() for each in by_start])
+    value = complex(means.mean())
+    # Windows that overlap by half are as good as independent.
+    within = np.concatenate([each - mean for each, mean in zip(by_start, means, strict=True)])
+    freedom = max(windows.size - len(starts), 1)
+    deviation = math.sqrt(float((np.abs(within) ** 2).sum()) / freedom)
+    error = max(
+        _SURE * deviation / math.sqrt(windows.size), float(np.abs(means - value).max())
+    )
+    every = [start.every for start in starts]
+    shares = [
+        float(np.concatenate([getattr(each, name) for each in every]).mean())
+        for name in ("weight", "torque", "held", "lifted")
+    ]
+    periods = _PERIODS * sum(each.weight.size for each in every)
+    return BitResponse(
+        frequency, amplitude, value, error, windows, means, *shares, periods, Status.DONE
+    )
