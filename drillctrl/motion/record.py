@@ -1,4 +1,4 @@
-"""Sums over a run in windows: what a frequency holds of the torque, and how the bit met the rock."""
+"""Sums over windows of a run: what a frequency holds of the torque, and how the bit met rock."""
 
 from __future__ import annotations
 
@@ -63,7 +63,8 @@ def halves(run: Trace, since: float, half: float, frequency: float) -> Halves:
     place = np.searchsorted(edges, 0.5 * (corners[:-1] + corners[1:]), side="right") - 1
 
     def means(values: FloatArray) -> FloatArray:
-        return np.bincount(place, (share * values).sum(axis=1), minlength=count)
+        sums = np.bincount(place, (share * values).sum(axis=1), minlength=count)
+        return np.asarray(sums, dtype=float)
 
     def tone(omega: float) -> ComplexArray:
         phase = omega * (times - since)

@@ -13,19 +13,21 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.motion.record import Halves, halves, windowed
 from drillctrl.motion.turning import Turned
+from drillctrl.simulation.outcome import grows_without_bound
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.status import Status
+from drillctrl.simulation.status import Outcome, Status
 
 # H is told to this, in units of sqrt(I Kt), unless it takes too long.
 TOLERANCE = 3e-3
-MOST_PERIODS = 400
+MOST_PERIODS, FEWEST_PERIODS = 400, 40
 # Axial kicks, over the rate of penetration, from which the orbit is reached: out of smooth
 # drilling, and off the rock.
 KICKS = (0.1, -2.0)
-# Periods of a half window, and half windows of a run that is gone on from.
-_PERIODS, _PER_RUN = 4, 10
+# Periods of a half window. Half windows of a run that is gone on from, an even number; fewer
+# of a long string, whose history takes much memory.
+_PERIODS, _PER_RUN, _PER_LONG_RUN, _LONG = 4, 10, 2, 20
 _SETTLING = 6.0
 _SHORTEST, _LONGEST = 60.0, 300.0
 _SURE = 2.0
@@ -57,8 +59,9 @@ class BitResponse:
         Shares of the time: held at Z' = 0, and off the rock.
     periods : int
         Of ω, that were looked at.
-    status : Status
-        ``DONE``, or why a run broke off.
+    broken : Status, Outcome or None
+        Why a run broke off: its status, or that the bit bounces without bound, for which an
+        imposed rotation has power enough.
     """
 
     frequency: float
@@ -72,12 +75,14 @@ class BitResponse:
     held: float
     lifted: float
     periods: int
-    status: Status
+    broken: Status | Outcome | None = None
 
     @property
     def scatter(self) -> float:
-        """Largest distance of H in a window from its mean."""
-        return float(np.abs(self.windows - self.value).max(initial=0.0))
+        """Largest distance of H in a window from its mean; infinite where there is none."""
+        if self.broken is not None:
+            return math.inf
+        return float(np.abs(self.windows - self.value).max())
 
 
 def turned_case(where: Where, frequency: float) -> Case:
@@ -147,7 +152,7 @@ def bit_response(
     frequency = checked_number("frequency", frequency, 0.0, 1e3, open_low=True)
     amplitude = checked_number("amplitude", amplitude, 0.0, 0.999, open_low=True)
     tolerance = checked_number("tolerance", tolerance, 0.0, 1e6, open_low=True)
-    most_periods = checked_integer("most_periods", most_periods, 40, 1_000_000)
+    most_periods = checked_integer("most_periods", most_periods, FEWEST_PERIODS, 1_000_000)
     case = turned_case(where, frequency)
     starts = [_Start(case, frequency, amplitude, kick, options) for kick in KICKS]
     while True:
@@ -155,7 +160,7 @@ def bit_response(
             start.go_on()
         found = _response(starts, frequency, amplitude)
         periods = found.periods // len(starts)
-        if found.status != Status.DONE or found.error <= tolerance or periods >= most_periods:
+        if found.broken or found.error <= tolerance or periods >= most_periods:
             return found
 
 
@@ -165,25 +170,39 @@ class _Start:
     def __init__(
         self, case: Case, frequency: float, amplitude: float, kick: float, options: dict[str, Any]
     ) -> None:
-        _, point = case.physics("the response of a bit")
+        plant, point = case.physics("the response of a bit")
         self.case, self.frequency, self.options = case, frequency, options
         self.speed = amplitude * point.omega0
+        self.per_run = _PER_RUN if len(plant.state_names) <= _LONG else _PER_LONG_RUN
         period = 2.0 * math.pi / frequency
         self.half = _PERIODS * period
         self.wait = period * math.ceil(settling_time(case) / period)
         initial = {"dx": kick * point.penetration_rate, "dtheta": self.speed}
         self.scenario = Scenario(initial=initial)
         self.found: list[Halves] = []
-        self.run: Simulation | None = None
+        self.broken: Status | Outcome | None = None
 
     def go_on(self) -> None:
-        """Look at some more windows."""
-        wait = self.wait if self.run is None else 0.0
-        scenario = self.scenario if self.run is None else Scenario(start=self.run.past())
-        duration = wait + _PER_RUN * self.half
-        self.run = simulate(self.case, duration=duration, scenario=scenario, **self.options)
-        if self.run.status == Status.DONE:
-            self.found.append(halves(self.run, wait, self.half, self.frequency))
+        """Wait for the orbit if that was not done, and look at some more windows."""
+        piece = self.per_run * self.half
+        while self.wait > 0.0 and self.broken is None:
+            self._run(min(self.wait, piece))
+            self.wait = max(0.0, self.wait - piece)
+        for _ in range(_PER_RUN // self.per_run):
+            if self.broken is None:
+                run = self._run(piece)
+            if self.broken is None:
+                self.found.append(halves(run, 0.0, self.half, self.frequency))
+
+    def _run(self, duration: float) -> Simulation:
+        run = simulate(self.case, duration=duration, scenario=self.scenario, **self.options)
+        if run.status != Status.DONE:
+            self.broken = run.status
+        elif grows_without_bound(run, run.at(run.times, ("x", "dx", "dtheta"))):
+            self.broken = Outcome.DIVERGES
+        else:
+            self.scenario = Scenario(start=run.past())
+        return run
 
     @property
     def every(self) -> Halves:
@@ -198,7 +217,7 @@ class _Start:
 
 def _response(starts: list[_Start], frequency: float, amplitude: float) -> BitResponse:
     """Return what the windows so far say."""
-    broken = [start.run.status for start in starts if start.run and start.run.status != Status.DONE]
+    broken = [start.broken for start in starts if start.broken is not None]
     if broken:
         return BitResponse(
             frequency, amplitude, complex(math.nan, math.nan), math.inf,
@@ -213,15 +232,13 @@ def _response(starts: list[_Start], frequency: float, amplitude: float) -> BitRe
     within = np.concatenate([each - mean for each, mean in zip(by_start, means, strict=True)])
     freedom = max(windows.size - len(starts), 1)
     deviation = math.sqrt(float((np.abs(within) ** 2).sum()) / freedom)
-    error = max(
-        _SURE * deviation / math.sqrt(windows.size), float(np.abs(means - value).max())
-    )
+    error = max(_SURE * deviation / math.sqrt(windows.size), float(np.abs(means - value).max()))
     every = [start.every for start in starts]
-    shares = [
+    weight, torque, held, lifted = (
         float(np.concatenate([getattr(each, name) for each in every]).mean())
         for name in ("weight", "torque", "held", "lifted")
-    ]
+    )
     periods = _PERIODS * sum(each.weight.size for each in every)
     return BitResponse(
-        frequency, amplitude, value, error, windows, means, *shares, periods, Status.DONE
+        frequency, amplitude, value, error, windows, means, weight, torque, held, lifted, periods
     )
