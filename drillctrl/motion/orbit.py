@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,12 +21,12 @@ from drillctrl.simulation.summary import PER_STEP
 _CLOSES = 1e-3
 _MOST_RETURNS = 40
 _SETTLED = 1e-3
-_LOOKED_AT = 100.0
+_LOOKED_AT, _SAMPLES = 400.0, 40_001
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AxialOrbit:
-    """The axial motion at steady rotation, over its last hundred units of time.
+    """The axial motion at steady rotation, over its last 400 units of time.
 
     Attributes
     ----------
@@ -42,6 +42,10 @@ class AxialOrbit:
         Shares of the time: held at Z' = 0, and off the rock.
     deepest : float
         Largest depth of cut over that of smooth drilling.
+    spacing : float
+        Between the samples of the torque.
+    torque_samples : array
+        Torque on bit, less its mean, over the time looked at.
     broken : Status, Outcome or None
         Why the run broke off, or that the bit bounces without bound; all else is then NaN.
     """
@@ -55,6 +59,8 @@ class AxialOrbit:
     held: float
     lifted: float
     deepest: float
+    spacing: float = field(repr=False)
+    torque_samples: FloatArray = field(repr=False)
     broken: Status | Outcome | None = None
 
     @property
@@ -90,9 +96,11 @@ def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOr
         broken = Outcome.DIVERGES
     if broken is not None:
         no = float("nan")
-        return AxialOrbit(False, None, no, no, no, no, no, no, no, broken)
+        return AxialOrbit(False, None, no, no, no, no, no, no, no, no, np.zeros(0), broken)
     means = halves(run, wait, _LOOKED_AT, 1.0)
     tail = run.on_steps(PER_STEP, wait, ("dx", "depth"))
+    times = np.linspace(wait, float(run.times[-1]), _SAMPLES)
+    samples = run.at(times, ("torque_on_bit",)).torque_on_bit
     weight, torque = float(means.weight[0]), float(means.torque[0])
     settles = float(np.ptp(tail.dx)) <= _SETTLED * point.penetration_rate
     return AxialOrbit(
@@ -105,6 +113,8 @@ def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOr
         float(means.held[0]),
         float(means.lifted[0]),
         float(tail.depth.max()) / run.structure.steady_depth,
+        float(times[1] - times[0]),
+        samples - samples.mean(),
     )
 
 

@@ -50,6 +50,7 @@ def motion_fields(found: DrillingMotion) -> dict[str, Any]:
             "deepest_cut_ratio": _number(orbit.deepest),
             "broken": None if orbit.broken is None else str(orbit.broken),
         },
+        "forced_swing": found.floor,
         "modes": [_mode_fields(swing, units) for swing in found.modes],
     }
 
@@ -102,6 +103,8 @@ def motion_summary(found: DrillingMotion) -> str:
     lines = [_orbit_text(found.orbit, units)]
     for swing in found.modes:
         lines += ["", *_mode_lines(swing, units)]
+    if found.floor is not None:
+        lines += ["", f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else."]
     return "\n".join(lines)
 
 

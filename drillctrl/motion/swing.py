@@ -18,7 +18,7 @@ from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import si_scale
 from drillctrl.motion.orbit import AxialOrbit, axial_orbit
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, BitResponse, bit_response
-from drillctrl.motion.torsion import TorsionalMode, torsional_modes
+from drillctrl.motion.torsion import TorsionalMode, forced_speed, torsional_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,11 +140,15 @@ class DrillingMotion:
         Of a bit that turns evenly.
     modes : tuple of ModeSwing
         The slowest first.
+    floor : float or None
+        Swing of the speed, (max − min)/(2 mean), that the torque of the axial orbit forces by
+        itself, beside which every other swing stands; None where small swings do not decay.
     """
 
     case: Case
     orbit: AxialOrbit
     modes: tuple[ModeSwing, ...]
+    floor: float | None
 
     def plot(self, mode: int = 1) -> Axes:
         """Draw the damping left to a mode over the swing, in SI where there is a rig.
@@ -206,7 +210,18 @@ def drilling_motion(
     orbit = axial_orbit(case)
     with open_executor(workers, None) as executor:
         swings = tuple(_swing(case, mode, wanted, executor, options) for mode in found)
-    return DrillingMotion(case, orbit, swings)
+    return DrillingMotion(case, orbit, swings, _floor(case, orbit, swings))
+
+
+def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> float | None:
+    """Return the forced swing, with what the bit answers to the smallest amplitude."""
+    smallest = swings[0].at[0]
+    if orbit.broken is not None or not smallest.root.real < 0.0:
+        return None
+    mode, value = swings[0].mode, smallest.response.value
+    speed = forced_speed(mode, value, orbit.torque_samples, orbit.spacing)
+    _, point = case.physics("a forced swing")
+    return float(np.ptp(speed[speed.size // 2 :])) / (2.0 * point.omega0)
 
 
 def mode_at(where: Where, mode: TorsionalMode, amplitude: float, **options: Any) -> ModeAt:

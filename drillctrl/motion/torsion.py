@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.linalg
+import scipy.signal
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
@@ -99,3 +101,46 @@ def torsional_modes(where: Where, count: int = 1) -> tuple[TorsionalMode, ...]:
         )
         for k, i in enumerate(slowest)
     )
+
+
+def forced_speed(
+    mode: TorsionalMode, value: complex, torque: FloatArray, spacing: float
+) -> FloatArray:
+    """Return the bit's speed, beside its mean, that a torque on it forces, (k,).
+
+    Parameters
+    ----------
+    mode : TorsionalMode
+        Any of the string; all of its torsion moves.
+    value : complex
+        H at the mode; its imaginary part acts as a stiffness there.
+    torque : array, (k,)
+        At equal distances, with zero mean; the string is at rest before.
+    spacing : float
+        The distance.
+
+    Raises
+    ------
+    InputError
+        If the string does not decay with that H.
+    """
+    closed = mode.matrix.copy()
+    closed[:, 1] += value.real * mode.load
+    closed[:, 0] -= value.imag * mode.root.imag * mode.load
+    if not np.linalg.eigvals(closed).real.max() < 0.0:
+        raise InputError("response", value, "one with which the string decays")
+    size = mode.load.size
+    augmented = np.zeros((size + 2, size + 2))
+    augmented[:size, :size], augmented[:size, size] = closed, mode.load
+    augmented[size, size + 1] = 1.0
+    step = scipy.linalg.expm(augmented * spacing)
+    # Exact for a torque that runs straight between its samples.
+    now, slope = step[:size, size], step[:size, size + 1] / spacing
+    values, vectors = np.linalg.eig(step[:size, :size])
+    inverse = np.linalg.inv(vectors)
+    begin, end = inverse @ (now - slope), inverse @ slope
+    speed = np.zeros(torque.size)
+    for factor, a, b, row in zip(values, begin, end, vectors[1], strict=True):
+        entering = a * torque[:-1] + b * torque[1:]
+        speed[1:] += (row * scipy.signal.lfilter([1.0], [1.0, -factor], entering)).real
+    return speed
