@@ -104,7 +104,10 @@ def motion_summary(found: DrillingMotion) -> str:
     for swing in found.modes:
         lines += ["", *_mode_lines(swing, units)]
     if found.floor is not None:
-        lines += ["", f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else."]
+        lines += [
+            "",
+            f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else.",
+        ]
     return "\n".join(lines)
 
 

@@ -52,7 +52,7 @@ def _march(groups, amplitude, frequency, step, count, sums):
 def fixed_step_response(point, frequency, amplitude, periods=16, wait=12, step=1e-4):
     """Return H of an operating point, after so many periods of waiting."""
     period = 2.0 * math.pi / frequency
-    count = int(round((wait + periods) * period / step))
+    count = round((wait + periods) * period / step)
     sums = np.array([wait * period, 0.0, 0.0])
     names = ("omega0", "delta0", "psi", "eta", "xi", "blades", "lam", "beta")
     groups = tuple(float(getattr(point, name)) for name in names)

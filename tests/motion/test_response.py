@@ -14,6 +14,7 @@ from drillctrl import (
     RigPoint,
     axial_orbit,
     bit_response,
+    check_rig,
     cli,
     drilling_motion,
     mode_at,
@@ -127,11 +128,11 @@ def test_the_floor_is_the_swing_that_the_simulator_keeps(rpm, rop):
 
 def test_the_orbit_at_steady_rotation():
     orbit = axial_orbit(rig_point(120, 20))
-    # Mean feed is imposed, so the mean push on the string is what the mean stretch says.
+    # With torsion free the bit's speed ripples by 1.5 %, which moves the orbit a little.
     run = simulate(rig_point(120, 20), duration=400.0, initial={"dx": 0.05})
     tail = run.on_steps(5, 200.0, ("x", "weight_on_bit"))
     weight = np.trapezoid(tail.weight_on_bit, tail.times) / np.ptp(tail.times)
-    assert orbit.weight == pytest.approx(weight, rel=2e-3)
+    assert orbit.weight == pytest.approx(weight, rel=5e-3)
     assert orbit.periodic
     assert not orbit.settles
     assert orbit.held == pytest.approx(run.summary.axial_stick_fraction, abs=5e-3)
@@ -168,13 +169,16 @@ def test_modes_of_a_string_with_a_drive_are_those_of_its_linear_system():
     assert mode.root.real == pytest.approx(spectral_abscissa(plant_system(case)), abs=0.05)
     # Two inertias on one spring, 1 and 2, the first damped by 2κ.
     assert mode.root.imag == pytest.approx(math.sqrt(1.5), rel=1e-2)
-    string = RigPoint(string_preset("vertical-3000"), 12.0, 0.005)
-    roots = [m.root / string.rig.time_scale for m in torsional_modes(string, 3)]
-    linear = plant_system(as_case(string), None).A0
-    torsion = [i for i, n in enumerate(as_case(string).plant.state_names) if "theta" in n]
-    every = np.linalg.eigvals(linear[np.ix_(torsion, torsion)]) / string.rig.time_scale
-    # The cut adds to A0 at the bit only; the third mode hardly feels it.
-    assert np.abs(every - roots[2]).min() < 0.5
+
+
+def test_modes_of_a_string_are_those_of_its_pipes():
+    rig = replace(string_preset("vertical-3000"), drive_inertia=None)
+    pipes = check_rig(rig).torsional[:3]
+    found = torsional_modes(RigPoint(rig, 12.0, 0.005), 3)
+    frequencies = [mode.root.imag / rig.time_scale / (2.0 * math.pi) for mode in found]
+    assert frequencies == pytest.approx([mode.frequency for mode in pipes], rel=5e-3)
+    ratios = [-mode.root.real / abs(mode.root) for mode in found]
+    assert ratios == pytest.approx([mode.damping_ratio for mode in pipes], rel=0.02)
 
 
 def test_forced_speed_is_that_of_an_ordinary_integrator():
@@ -212,7 +216,9 @@ def test_what_has_no_orbit_is_refused(plant_c):
 def test_command_line(capsys, tmp_path):
     def run(*arguments):
         with pytest.raises(SystemExit) as stop:
-            cli.main(["bit", "--rig", "table1", "--speed", "120 rpm", "--rop", "20 m/h", *arguments])
+            cli.main(
+                ["bit", "--rig", "table1", "--speed", "120 rpm", "--rop", "20 m/h", *arguments]
+            )
         return stop.value.code, capsys.readouterr()
 
     picture = tmp_path / "bit.png"
@@ -231,7 +237,11 @@ def test_command_line(capsys, tmp_path):
     status, said = run("--amplitudes", "0.03")
     assert status == 0
     assert "Small swings decay" in said.out
-    for wrong, name in (("0.3,0.1", "--amplitudes"), ("a", "--amplitudes"), ("1.5", "--amplitudes")):
+    for wrong, name in (
+        ("0.3,0.1", "--amplitudes"),
+        ("a", "--amplitudes"),
+        ("1.5", "--amplitudes"),
+    ):
         status, said = run("--amplitudes", wrong)
         assert status == 2
         assert name in said.err
