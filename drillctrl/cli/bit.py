@@ -33,6 +33,11 @@ from drillctrl.cli.verb import Verb
     show_default=True,
     help="Periods of each start that are looked at where the orbit is irregular.",
 )
+@click.option(
+    "--imposed",
+    is_flag=True,
+    help="Impose the rotation whole: no ripple beside the swing.",
+)
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json.")
@@ -41,6 +46,7 @@ def bit_command(
     amplitudes: str | None,
     modes: int,
     most_periods: int,
+    imposed: bool,
     workers: int,
     as_json: bool,
     out: str | None,
@@ -71,6 +77,7 @@ def bit_command(
         modes=modes,
         workers=workers,
         most_periods=most_periods,
+        ripple=not imposed,
     )
     fields = motion_fields(found)
     if out is not None:

@@ -18,15 +18,17 @@ class Halves(NamedTuple):
 
     Attributes
     ----------
-    tones : complex array, (h, 3)
-        Means of T e^(−iωt) times 1, e^(iνt) and e^(−iνt), with ν = 2π over the window.
+    torques, speeds : complex array, (h, 3)
+        Means of T e^(−iωt), and of θ' likewise, times 1, e^(iνt) and e^(−iνt), with ν = 2π over
+        the window.
     weight, torque : array, (h,)
         Mean loads on the bit.
     held, lifted : array, (h,)
         Shares of the time.
     """
 
-    tones: ComplexArray
+    torques: ComplexArray
+    speeds: ComplexArray
     weight: FloatArray
     torque: FloatArray
     held: FloatArray
@@ -54,11 +56,17 @@ def halves(run: Trace, since: float, half: float, frequency: float) -> Halves:
     corners = np.unique(np.concatenate([edges, inside]))
     length = np.diff(corners)
     times = corners[:-1, None] + 0.5 * length[:, None] * (_NODES + 1.0)
-    motion = run.at(times.ravel(), ("torque_on_bit", "weight_on_bit", "contact"))
+    motion = run.at(times.ravel(), ("torque_on_bit", "dtheta", "weight_on_bit", "contact"))
     share = 0.5 * length[:, None] * _WEIGHTS / half
-    torque, weight, contact, held = (
+    torque, speed, weight, contact, held = (
         np.asarray(values).reshape(times.shape)
-        for values in (motion.torque_on_bit, motion.weight_on_bit, motion.contact, motion.held)
+        for values in (
+            motion.torque_on_bit,
+            motion.dtheta,
+            motion.weight_on_bit,
+            motion.contact,
+            motion.held,
+        )
     )
     place = np.searchsorted(edges, 0.5 * (corners[:-1] + corners[1:]), side="right") - 1
 
@@ -66,28 +74,29 @@ def halves(run: Trace, since: float, half: float, frequency: float) -> Halves:
         sums = np.bincount(place, (share * values).sum(axis=1), minlength=count)
         return np.asarray(sums, dtype=float)
 
-    def tone(omega: float) -> ComplexArray:
-        phase = omega * (times - since)
-        return means(torque * np.cos(phase)) - 1j * means(torque * np.sin(phase))
+    def tones(values: FloatArray) -> ComplexArray:
+        found = []
+        for omega in (frequency, frequency - np.pi / half, frequency + np.pi / half):
+            phase = omega * (times - since)
+            found.append(means(values * np.cos(phase)) - 1j * means(values * np.sin(phase)))
+        return np.stack(found, axis=1)
 
-    beside = np.pi / half
-    tones = [tone(frequency), tone(frequency - beside), tone(frequency + beside)]
     on_rock = contact.astype(float)
     return Halves(
-        np.stack(tones, axis=1), means(weight), means(torque),
+        tones(torque), tones(speed), means(weight), means(torque),
         means((contact & held).astype(float)), means(1.0 - on_rock),
     )  # fmt: skip
 
 
-def windowed(found: Halves) -> ComplexArray:
-    """Return the amplitude of T in e^(iωt) in windows that overlap by half, (h − 1,).
+def windowed(tones: ComplexArray) -> ComplexArray:
+    """Return the amplitude at ω in windows that overlap by half, (h − 1,), from `Halves`.
 
     Each is weighed by 1 − cos, so that neither the mean nor the lines of the axial orbit,
     which is in no whole ratio to ω, leak into it.
     """
     # From one half to the next the weight turns by π.
-    turn = (-1.0) ** np.arange(found.tones.shape[0])
-    plain = found.tones[:, 0]
-    beside = 0.5 * turn * (found.tones[:, 1] + found.tones[:, 2])
+    turn = (-1.0) ** np.arange(tones.shape[0])
+    plain = tones[:, 0]
+    beside = 0.5 * turn * (tones[:, 1] + tones[:, 2])
     # Halves that begin a window, and those that end one.
     return (plain - beside)[:-1] + (plain + beside)[1:]

@@ -89,6 +89,7 @@ def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
         "held_fraction": _number(response.held),
         "lifted_fraction": _number(response.lifted),
         "periods": response.periods,
+        "ripple": response.ripple,
         "broken": None if response.broken is None else str(response.broken),
     }
 

@@ -12,7 +12,7 @@ from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.motion.record import Halves, halves, windowed
-from drillctrl.motion.turning import Turned
+from drillctrl.motion.turning import Led, Turned
 from drillctrl.simulation.outcome import grows_without_bound
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
@@ -42,7 +42,7 @@ class BitResponse:
     frequency : float
         ω.
     amplitude : float
-        A, share of the rotary speed.
+        A, share of the rotary speed, as it came out.
     value : complex
         H, amplitude of the torque on bit over that of the speed; a positive real part damps.
         NaN where a run broke off. At −ω it is the conjugate.
@@ -59,6 +59,8 @@ class BitResponse:
         Shares of the time: held at Z' = 0, and off the rock.
     periods : int
         Of ω, that were looked at.
+    ripple : bool
+        Whether the speed rippled beside the swing.
     broken : Status, Outcome or None
         Why a run broke off: its status, or that the bit bounces without bound, for which an
         imposed rotation has power enough.
@@ -75,6 +77,7 @@ class BitResponse:
     held: float
     lifted: float
     periods: int
+    ripple: bool = False
     broken: Status | Outcome | None = None
 
     @property
@@ -85,8 +88,10 @@ class BitResponse:
         return float(np.abs(self.windows - self.value).max())
 
 
-def turned_case(where: Where, frequency: float) -> Case:
-    """Return the axial motion of a case under an imposed rotation, which θ' at t = 0 sets.
+def turned_case(where: Where, frequency: float, ripple: bool = False) -> Case:
+    """Return the motion of a case under a rotation that swings at a frequency.
+
+    It is imposed, and θ' at t = 0 sets it; or led, with ripple, and θ' of ``lead`` does.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def turned_case(where: Where, frequency: float) -> Case:
     plant, point = case.physics("the response of a bit")
     if not point.delta0 > 0.0:
         raise InputError("delta0", point.delta0, "above 0: a bit that cuts nothing has no orbit")
-    turning = Turned(turning_frequency=frequency)
+    turning = Led(lead_frequency=frequency) if ripple else Turned(turning_frequency=frequency)
     return Case(replace(plant, blocks=(*plant.blocks, turning)), point)
 
 
@@ -115,6 +120,7 @@ def bit_response(
     *,
     tolerance: float = TOLERANCE,
     most_periods: int = MOST_PERIODS,
+    ripple: bool = False,
     **options: Any,
 ) -> BitResponse:
     """Return the response H(iω, A) of a bit on its axial orbit.
@@ -135,6 +141,10 @@ def bit_response(
         Error of H at which no more windows are looked at, in units of the torque per speed.
     most_periods : int
         So many periods of ω of each start are looked at where the error stays larger.
+    ripple : bool
+        Whether the speed is imposed at ω alone, so that the torque of the orbit makes it
+        ripple at all other frequencies, as far as the torsional string lets it; else the
+        rotation is imposed whole. With ripple A comes out a few per cent off what was asked.
     **options
         ``cutting``, ``rtol`` and others of `simulate`.
 
@@ -153,12 +163,13 @@ def bit_response(
     amplitude = checked_number("amplitude", amplitude, 0.0, 0.999, open_low=True)
     tolerance = checked_number("tolerance", tolerance, 0.0, 1e6, open_low=True)
     most_periods = checked_integer("most_periods", most_periods, FEWEST_PERIODS, 1_000_000)
-    case = turned_case(where, frequency)
-    starts = [_Start(case, frequency, amplitude, kick, options) for kick in KICKS]
+    case = turned_case(where, frequency, ripple)
+    settling = settling_time(turned_case(where, frequency))
+    starts = [_Start(case, settling, frequency, amplitude, kick, options) for kick in KICKS]
     while True:
         for start in starts:
             start.go_on()
-        found = _response(starts, frequency, amplitude)
+        found = _response(starts, frequency, amplitude, ripple)
         periods = found.periods // len(starts)
         if found.broken or found.error <= tolerance or periods >= most_periods:
             return found
@@ -168,7 +179,13 @@ class _Start:
     """A run from one axial kick, gone on from as long as asked, and its windows."""
 
     def __init__(
-        self, case: Case, frequency: float, amplitude: float, kick: float, options: dict[str, Any]
+        self,
+        case: Case,
+        settling: float,
+        frequency: float,
+        amplitude: float,
+        kick: float,
+        options: dict[str, Any],
     ) -> None:
         plant, point = case.physics("the response of a bit")
         self.case, self.frequency, self.options = case, frequency, options
@@ -176,8 +193,10 @@ class _Start:
         self.per_run = _PER_RUN if len(plant.state_names) <= _LONG else _PER_LONG_RUN
         period = 2.0 * math.pi / frequency
         self.half = _PERIODS * period
-        self.wait = period * math.ceil(settling_time(case) / period)
+        self.wait = period * math.ceil(settling / period)
         initial = {"dx": kick * point.penetration_rate, "dtheta": self.speed}
+        if "dlead" in plant.state_names:
+            initial["dlead"] = self.speed
         self.scenario = Scenario(initial=initial)
         self.found: list[Halves] = []
         self.broken: Status | Outcome | None = None
@@ -210,19 +229,26 @@ class _Start:
         return Halves(*[np.concatenate(parts) for parts in zip(*self.found, strict=True)])
 
     @property
+    def speeds(self) -> ComplexArray:
+        """Amplitude of the speed in each window; each run begins at phase 0."""
+        return windowed(self.every.speeds)
+
+    @property
     def windows(self) -> ComplexArray:
-        """H in each window; each run lasts whole periods, and so each begins at phase 0."""
-        return windowed(self.every) / self.speed
+        """H in each window."""
+        return windowed(self.every.torques) / self.speeds
 
 
-def _response(starts: list[_Start], frequency: float, amplitude: float) -> BitResponse:
+def _response(
+    starts: list[_Start], frequency: float, amplitude: float, ripple: bool
+) -> BitResponse:
     """Return what the windows so far say."""
     broken = [start.broken for start in starts if start.broken is not None]
     if broken:
         return BitResponse(
             frequency, amplitude, complex(math.nan, math.nan), math.inf,
             np.zeros(0, dtype=complex), np.full(len(starts), np.nan + 0j),
-            math.nan, math.nan, math.nan, math.nan, 0, broken[0],
+            math.nan, math.nan, math.nan, math.nan, 0, ripple, broken[0],
         )  # fmt: skip
     by_start = [start.windows for start in starts]
     windows = np.concatenate(by_start)
@@ -238,7 +264,21 @@ def _response(starts: list[_Start], frequency: float, amplitude: float) -> BitRe
         float(np.concatenate([getattr(each, name) for each in every]).mean())
         for name in ("weight", "torque", "held", "lifted")
     )
+    _, point = starts[0].case.physics("the response of a bit")
+    swings = np.concatenate([np.abs(start.speeds) for start in starts])
+    amplitude = float(swings.mean()) / point.omega0
     periods = _PERIODS * sum(each.weight.size for each in every)
     return BitResponse(
-        frequency, amplitude, value, error, windows, means, weight, torque, held, lifted, periods
+        frequency,
+        amplitude,
+        value,
+        error,
+        windows,
+        means,
+        weight,
+        torque,
+        held,
+        lifted,
+        periods,
+        ripple,
     )

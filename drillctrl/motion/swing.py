@@ -194,7 +194,7 @@ def drilling_motion(
     workers : int
         Processes.
     **options
-        Of `bit_response`.
+        Of `mode_at`.
 
     Raises
     ------
@@ -224,7 +224,9 @@ def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> floa
     return float(np.ptp(speed[speed.size // 2 :])) / (2.0 * point.omega0)
 
 
-def mode_at(where: Where, mode: TorsionalMode, amplitude: float, **options: Any) -> ModeAt:
+def mode_at(
+    where: Where, mode: TorsionalMode, amplitude: float, *, ripple: bool = True, **options: Any
+) -> ModeAt:
     """Return what becomes of a mode where the bit swings by an amplitude.
 
     Parameters
@@ -235,16 +237,33 @@ def mode_at(where: Where, mode: TorsionalMode, amplitude: float, **options: Any)
         Of `torsional_modes`.
     amplitude : float
         A in (0, 1).
+    ripple : bool
+        Whether the speed ripples under the torque of the orbit, which makes rates exact; where
+        the bit would turn back, as near A = 1, the rotation is imposed all the same.
     **options
         Of `bit_response`.
     """
+    found = _followed(where, mode, amplitude, {**options, "ripple": ripple})
+    if ripple and found.broken is not None:
+        found = _followed(where, mode, amplitude, options)
+    if found.broken is not None:
+        return ModeAt(found, complex(math.nan, math.nan), math.inf)
+    root = mode.with_response(found.value)
+    around = [mode.with_response(found.value + found.error * d) for d in _DIRECTIONS]
+    return ModeAt(found, root, max(abs(each.real - root.real) for each in around))
+
+
+def _followed(
+    where: Where, mode: TorsionalMode, amplitude: float, options: dict[str, Any]
+) -> BitResponse:
+    """Return the response at the frequency of the root that follows from it."""
     frequency = mode.root.imag
     # The frequency follows few windows; its own error moves H little.
     quick = {**options, "most_periods": FEWEST_PERIODS}
     for _ in range(_FOLLOWED):
         response = bit_response(where, frequency, amplitude, **quick)
         if response.broken is not None:
-            break
+            return response
         root = mode.with_response(response.value)
         shift = abs(root.imag - frequency)
         # An error of H that moves the frequency further than that says nothing of it.
@@ -252,16 +271,9 @@ def mode_at(where: Where, mode: TorsionalMode, amplitude: float, **options: Any)
         if unsure or shift <= _NEAR * frequency or root.imag < _LOWEST * mode.root.imag:
             break
         frequency = root.imag
-    if response.broken is None:
-        enough = response.error <= options.get("tolerance", TOLERANCE)
-        if not enough or response.frequency != frequency:
-            response = bit_response(where, frequency, amplitude, **options)
-    if response.broken is not None:
-        return ModeAt(response, complex(math.nan, math.nan), math.inf)
-    root = mode.with_response(response.value)
-    around = [mode.with_response(response.value + response.error * d) for d in _DIRECTIONS]
-    error = max(abs(each.real - root.real) for each in around)
-    return ModeAt(response, root, error)
+    if response.frequency == frequency and response.error <= options.get("tolerance", TOLERANCE):
+        return response
+    return bit_response(where, frequency, amplitude, **options)
 
 
 def _task(task: tuple[int, Case, TorsionalMode, float, dict[str, Any]]) -> tuple[int, ModeAt]:

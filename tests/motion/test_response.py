@@ -81,7 +81,14 @@ def test_a_program_of_fixed_steps_finds_the_same(rpm, rop, amplitude):
 
 @pytest.mark.parametrize(
     ("rpm", "rop", "damping", "kick"),
-    [(120, 20, 32.9, 0.1), (120, 20, 15.0, 0.01), (100, 10, 32.9, 0.1), (90, 10, 10.0, 0.05)],
+    [
+        (120, 20, 32.9, 0.1),
+        (120, 20, 15.0, 0.01),
+        (100, 10, 32.9, 0.1),
+        (90, 10, 10.0, 0.05),
+        (100, 30, 32.9, 0.05),
+        (130, 30, 32.9, 0.02),
+    ],
 )
 def test_the_growth_rate_is_that_of_the_whole_simulator(rpm, rop, damping, kick):
     where = rig_point(rpm, rop, torsional_damping=damping)
@@ -92,7 +99,20 @@ def test_the_growth_rate_is_that_of_the_whole_simulator(rpm, rop, damping, kick)
     (mode,) = torsional_modes(where)
     found = mode_at(where, mode, float(np.exp(np.log(swing).mean())))
     assert found.sign == np.sign(rate)
-    assert found.root.real == pytest.approx(rate, rel=0.08)
+    assert found.root.real == pytest.approx(rate, rel=0.06)
+
+
+def test_a_led_speed_comes_out_as_asked_and_hardly_changes_the_answer_of_a_held_bit():
+    where = rig_point(120, 20)
+    imposed, led = (bit_response(where, 1.0, 0.05, ripple=ripple) for ripple in (False, True))
+    assert imposed.amplitude == pytest.approx(0.05, rel=1e-6)
+    assert led.amplitude == pytest.approx(0.05, rel=0.05)
+    assert led.ripple
+    assert 0.05 < abs(led.value - imposed.value) * UNIT < 1.0
+    # A swing of nearly all of the speed and a ripple would turn the bit back.
+    (mode,) = torsional_modes(rig_point(120, 50))
+    found = mode_at(rig_point(120, 50), mode, 0.95)
+    assert found.sign == -1
 
 
 def test_two_motions_at_120_rpm_and_50_metres_an_hour():
@@ -222,7 +242,7 @@ def test_command_line(capsys, tmp_path):
         return stop.value.code, capsys.readouterr()
 
     picture = tmp_path / "bit.png"
-    status, said = run("--amplitudes", "0.03,0.3", "--json", "--plot", str(picture))
+    status, said = run("--amplitudes", "0.03,0.3", "--imposed", "--json", "--plot", str(picture))
     fields = json.loads(said.out)
     assert status == 0
     assert picture.stat().st_size > 5000
