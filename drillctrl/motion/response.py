@@ -28,8 +28,8 @@ KICKS = (0.1, -2.0)
 # Periods of a half window. Half windows of a run that is gone on from, an even number; fewer
 # of a long string, whose history takes much memory.
 _PERIODS, _PER_RUN, _PER_LONG_RUN, _LONG = 4, 10, 2, 20
-_SETTLING = 6.0
-_SHORTEST, _LONGEST = 60.0, 300.0
+_SETTLING = 10.0
+_SHORTEST, _LONGEST = 60.0, 500.0
 _SURE = 2.0
 
 

@@ -18,7 +18,7 @@ from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import si_scale
 from drillctrl.motion.orbit import AxialOrbit, axial_orbit
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, BitResponse, bit_response
-from drillctrl.motion.torsion import TorsionalMode, forced_speed, torsional_modes
+from drillctrl.motion.torsion import TorsionalMode, ripple_of, torsional_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -219,9 +219,9 @@ def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> floa
     if orbit.broken is not None or not smallest.root.real < 0.0:
         return None
     mode, value = swings[0].mode, smallest.response.value
-    speed = forced_speed(mode, value, orbit.torque_samples, orbit.spacing)
+    speed = ripple_of(mode, value, orbit.torque_samples, orbit.spacing)
     _, point = case.physics("a forced swing")
-    return float(np.ptp(speed[speed.size // 2 :])) / (2.0 * point.omega0)
+    return float(np.ptp(speed)) / (2.0 * point.omega0)
 
 
 def mode_at(

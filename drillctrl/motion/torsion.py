@@ -124,9 +124,7 @@ def forced_speed(
     InputError
         If the string does not decay with that H.
     """
-    closed = mode.matrix.copy()
-    closed[:, 1] += value.real * mode.load
-    closed[:, 0] -= value.imag * mode.root.imag * mode.load
+    closed = _answering(mode, value)
     if not np.linalg.eigvals(closed).real.max() < 0.0:
         raise InputError("response", value, "one with which the string decays")
     size = mode.load.size
@@ -144,3 +142,27 @@ def forced_speed(
         entering = a * torque[:-1] + b * torque[1:]
         speed[1:] += (row * scipy.signal.lfilter([1.0], [1.0, -factor], entering)).real
     return speed
+
+
+def ripple_of(
+    mode: TorsionalMode, value: complex, torque: FloatArray, spacing: float
+) -> FloatArray:
+    """Return the second half of `forced_speed`, less what the start from rest has left in it.
+
+    Modes that hardly decay would keep that for longer than any record.
+    """
+    speed = forced_speed(mode, value, torque, spacing)
+    late = speed[speed.size // 2 :]
+    roots = np.linalg.eigvals(_answering(mode, value))
+    free = np.exp(np.outer(spacing * np.arange(late.size), roots[roots.imag >= 0.0]))
+    columns = np.hstack([free.real, free.imag])
+    left, *_ = np.linalg.lstsq(columns, late, rcond=None)
+    return np.asarray(late - columns @ left)
+
+
+def _answering(mode: TorsionalMode, value: complex) -> FloatArray:
+    """Return the string's matrix with H as a damper and a spring at the bit."""
+    closed = mode.matrix.copy()
+    closed[:, 1] += value.real * mode.load
+    closed[:, 0] -= value.imag * mode.root.imag * mode.load
+    return closed

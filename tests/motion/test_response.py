@@ -27,7 +27,7 @@ from drillctrl import (
     torsional_modes,
 )
 from drillctrl.drilling.case import as_case
-from drillctrl.motion.torsion import forced_speed
+from drillctrl.motion.torsion import forced_speed, ripple_of
 from drillctrl.simulation.status import Outcome
 from tests.motion.fixed_step import fixed_step_response
 
@@ -212,6 +212,16 @@ def test_forced_speed_is_that_of_an_ordinary_integrator():
     expected = scipy.signal.lsim(system, torque, times)[1]
     found = forced_speed(mode, value, torque, times[1] - times[0])
     assert found == pytest.approx(expected, abs=1e-9)
+    # Without its start a motion forced at one frequency is one tone.
+    times = np.linspace(0.0, 400.0, 40001)
+    tone = ripple_of(mode, value, np.sin(1.7 * times), times[1] - times[0])
+    late = times[times.size // 2 :]
+    s = 1.7j
+    gain = abs(s / (s**2 + (0.1 + value.real) * s + stiffness))
+    found = np.stack([np.sin(1.7 * late), np.cos(1.7 * late)])
+    parts = np.linalg.lstsq(found.T, tone, rcond=None)[0]
+    assert np.hypot(*parts) == pytest.approx(gain, rel=0.02)
+    assert tone == pytest.approx(parts @ found, abs=0.02 * gain)
     with pytest.raises(InputError, match="response"):
         forced_speed(mode, -0.2 + 0.0j, torque, 0.01)
 
