@@ -156,7 +156,9 @@ def ripple_of(
     roots = np.linalg.eigvals(_answering(mode, value))
     free = np.exp(np.outer(spacing * np.arange(late.size), roots[roots.imag >= 0.0]))
     columns = np.hstack([free.real, free.imag])
-    left, *_ = np.linalg.lstsq(columns, late, rcond=None)
+    # Ends weigh nothing, so that what is forced is not taken for what is left.
+    weight = np.sin(np.linspace(0.0, np.pi, late.size))
+    left, *_ = np.linalg.lstsq(columns * weight[:, None], late * weight, rcond=None)
     return np.asarray(late - columns @ left)
 
 
