@@ -1,4 +1,4 @@
-"""Figures of the bit's response. Each takes arrays and matplotlib Axes, or makes them."""
+"""The figure of the damping left. It takes arrays and matplotlib Axes, or makes them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.figure import BLUE, GREY, ORANGE, new_axes
 
 if TYPE_CHECKING:
@@ -53,36 +53,4 @@ def plot_damping(
     ax.set_ylabel(f"damping left{f', {unit}' if unit else ''}")
     if label is not None or crossings:
         ax.legend(fontsize="small")
-    return ax
-
-
-def plot_response(
-    frequencies: FloatArray,
-    values: ComplexArray,
-    errors: FloatArray,
-    unit: str = "",
-    ax: Axes | None = None,
-) -> Axes:
-    """Draw real and imaginary part of H over frequency.
-
-    Parameters
-    ----------
-    frequencies, values, errors : array, (k,)
-        ω, H, and the error of |H|.
-    unit : str
-        Of H.
-    ax : Axes, optional
-        By default new ones.
-    """
-    ax = new_axes(6.4, 4.2) if ax is None else ax
-    known = np.isfinite(values) & np.isfinite(errors)
-    ax.axhline(0.0, color=GREY, linewidth=0.8)
-    for part, colour, label in ((values.real, BLUE, "Re H"), (values.imag, ORANGE, "Im H")):
-        ax.errorbar(
-            frequencies[known], part[known], errors[known],
-            color=colour, marker="o", markersize=3, linewidth=1.1, capsize=2, label=label,
-        )  # fmt: skip
-    ax.set_xlabel("frequency")
-    ax.set_ylabel(f"H{f', {unit}' if unit else ''}")
-    ax.legend(fontsize="small")
     return ax

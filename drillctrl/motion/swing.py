@@ -142,7 +142,7 @@ class DrillingMotion:
         The slowest first.
     floor : float or None
         Swing of the speed, (max − min)/(2 mean), that the torque of the axial orbit forces by
-        itself, beside which every other swing stands; None where small swings do not decay.
+        itself, beside which every other swing stands; None where it is not sure that small swings decay.
     """
 
     case: Case
@@ -216,7 +216,7 @@ def drilling_motion(
 def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> float | None:
     """Return the forced swing, with what the bit answers to the smallest amplitude."""
     smallest = swings[0].at[0]
-    if orbit.broken is not None or not smallest.root.real < 0.0:
+    if orbit.broken is not None or smallest.sign >= 0:
         return None
     mode, value = swings[0].mode, smallest.response.value
     speed = ripple_of(mode, value, orbit.torque_samples, orbit.spacing)

@@ -17,7 +17,7 @@ def _march(groups, amplitude, frequency, step, count, sums):
     for i in range(back):
         t = (i - back) * step
         deepest[i], angle[i] = v0 * t, omega0 * t
-    z, rate, j, mean = 0.0, 1.1 * v0, 0, 0.0
+    z, rate, j = 0.0, 1.1 * v0, 0
     for i in range(count):
         t = i * step
         k = back + i
@@ -45,8 +45,6 @@ def _march(groups, amplitude, frequency, step, count, sums):
             torque = (cut + beta * pressed) * window
             sums[1] += torque * math.cos(frequency * t)
             sums[2] -= torque * math.sin(frequency * t)
-            mean += pressed if 0.0 < pressed < 1.0 else 0.0
-    return mean
 
 
 def fixed_step_response(point, frequency, amplitude, periods=16, wait=12, step=1e-4):
