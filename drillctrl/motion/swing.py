@@ -142,7 +142,8 @@ class DrillingMotion:
         The slowest first.
     floor : float or None
         Swing of the speed, (max − min)/(2 mean), that the torque of the axial orbit forces by
-        itself, beside which every other swing stands; None where it is not sure that small swings decay.
+        itself, beside which every other swing stands; None where it is not sure that small
+        swings decay.
     """
 
     case: Case
