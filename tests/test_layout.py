@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
-    *("designs", "charts", "tables", "studies", "paper", "interop", "cli"),
+    *("motion", "designs", "charts", "tables", "studies", "paper", "interop", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (
@@ -22,7 +22,13 @@ RESULTS = (
         "charts.stabilisable",
         "charts.volume",
     ),
-    *("tables.table", "simulation.result", "studies.campaign", "studies.comparison"),
+    *(
+        "tables.table",
+        "simulation.result",
+        "motion.swing",
+        "studies.campaign",
+        "studies.comparison",
+    ),
 )
 
 

@@ -12,6 +12,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.analyze import analyze_command
+from drillctrl.cli.bit import bit_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
@@ -39,6 +40,7 @@ for _command in (
     chart_command,
     compare_command,
     simulate_command,
+    bit_command,
     table_command,
     reproduce_command,
     rig_command,

@@ -71,8 +71,9 @@ class Structure:
     def is_same(self, other: Structure) -> bool:
         """Whether another string and law move alike."""
         names = ("q", "A", "E", "B", "T")
+        # Coefficients that a string has no use for are NaN.
         return self.physics == other.physics and all(
-            np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name))
+            np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name), equal_nan=True)
             for name in names
         )
 

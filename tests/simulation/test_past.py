@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
+from drillctrl.strings.presets import string_preset
 
 POINT = OperatingPoint(10.0, 2.5, 14.0)
 GAINS = ("case1", [-3.82], [3.61])
@@ -100,3 +101,12 @@ def test_a_past_that_does_not_fit_is_refused():
     run = simulate(POINT, duration=10.0, scenario=changed)
     with pytest.raises(InputError, match="changed"):
         run.past(3.0)
+
+
+def test_a_run_of_a_string_goes_on_from_its_past():
+    """Coefficients that a string of pipe has no use for are no numbers, which equal nothing."""
+    where = RigPoint(string_preset("paper-string"), 15.0, 0.003)
+    whole = simulate(where, duration=4.0, initial={"dtheta": 1.0})
+    first = simulate(where, duration=2.0, initial={"dtheta": 1.0})
+    rest = simulate(where, duration=2.0, scenario=Scenario(start=first.past()))
+    assert apart(whole, rest, 2.0) < 1e-5

@@ -1,0 +1,99 @@
+"""`drillctrl bit`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from drillctrl.base.errors import InputError
+from drillctrl.cli.output import (
+    check_figure,
+    check_json,
+    json_text,
+    write_figure,
+    write_json,
+)
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.verb import Verb
+
+
+@click.command(name="bit", cls=Verb)
+@point_options
+@click.option(
+    "--amplitudes",
+    metavar="A,…",
+    help="Swings of the bit's speed, shares of it, rising in (0, 1); 0.01 to 0.95 without it.",
+)
+@click.option("--modes", type=int, default=1, show_default=True, help="Torsional modes.")
+@click.option(
+    "--most-periods",
+    type=int,
+    default=400,
+    show_default=True,
+    help="Periods of each start that are looked at where the orbit is irregular.",
+)
+@click.option(
+    "--imposed",
+    is_flag=True,
+    help="Impose the rotation whole: no ripple beside the swing.",
+)
+@click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json.")
+@click.option("--plot", type=click.Path(), help="Draw the damping left: FILE.png, .svg, .pdf.")
+def bit_command(
+    amplitudes: str | None,
+    modes: int,
+    most_periods: int,
+    imposed: bool,
+    workers: int,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    **point: Any,
+) -> None:
+    """Say how the bit on its axial orbit answers to its speed, and what swing that means.
+
+    The bit is turned at a speed that swings by A of its mean; H is the part of its torque that
+    follows. Damping left is the torsional mode's own and Re H: where it rises through zero over A
+    the rig swings by that much, where it falls through zero lies the kick that brings it there.
+
+    \b
+    Examples:
+      drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --amplitudes 0.03,0.3
+      drillctrl bit --rig table1 --speed "120 rpm" --rop "50 m/h" --plot bit.png
+    """
+    check_json(out)
+    check_figure(plot)
+    wanted = _read(amplitudes)
+    where = read_point(point)
+    from drillctrl.motion.report import motion_fields, motion_summary
+    from drillctrl.motion.swing import AMPLITUDES, drilling_motion
+
+    found = drilling_motion(
+        where,
+        AMPLITUDES if wanted is None else wanted,
+        modes=modes,
+        workers=workers,
+        most_periods=most_periods,
+        ripple=not imposed,
+    )
+    fields = motion_fields(found)
+    if out is not None:
+        write_json(out, fields)
+    if plot is not None:
+        figure = found.plot().get_figure(root=True)
+        assert figure is not None
+        write_figure(plot, figure)
+    click.echo(json_text(fields) if as_json else motion_summary(found))
+
+
+def _read(amplitudes: str | None) -> list[float] | None:
+    """Return the amplitudes that were typed."""
+    if amplitudes is None:
+        return None
+    try:
+        return [float(part) for part in amplitudes.split(",")]
+    except ValueError:
+        raise InputError("--amplitudes", amplitudes, "numbers such as 0.03,0.1,0.3") from None

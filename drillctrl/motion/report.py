@@ -1,0 +1,183 @@
+"""What is told of the motion that a rig drills with: words and JSON fields."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from drillctrl.drilling.case import Case
+from drillctrl.drilling.quantities import si_scale
+from drillctrl.motion.orbit import AxialOrbit
+from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
+
+
+class Units(NamedTuple):
+    """SI values of dimensionless units; 1 where there is no rig."""
+
+    response: float
+    time: float
+    weight: float
+    torque: float
+    response_name: str
+    rate_name: str
+
+
+def units_of(case: Case) -> Units:
+    """Return the units in which a case is told."""
+    if case.rig is None:
+        return Units(1.0, 1.0, 1.0, 1.0, "", "")
+    weight, torque, time = (si_scale(name, case.rig) for name in ("force", "torque", "time"))
+    return Units(torque * time, time, weight, torque, "N·m·s/rad", "1/s")
+
+
+def motion_fields(found: DrillingMotion) -> dict[str, Any]:
+    """Return the JSON fields; in SI where there is a rig, else dimensionless."""
+    units = units_of(found.case)
+    orbit = found.orbit
+    return {
+        "schema": "drillctrl/bit/1",
+        "units": "SI" if found.case.rig is not None else "dimensionless",
+        "orbit": {
+            "settles": orbit.settles,
+            "periodic": orbit.periodic,
+            "period": None if orbit.period is None else orbit.period * units.time,
+            "weight_on_bit": _number(orbit.weight * units.weight),
+            "torque_on_bit": _number(orbit.torque * units.torque),
+            "weight_ratio": _number(orbit.weight_ratio),
+            "torque_ratio": _number(orbit.torque_ratio),
+            "held_fraction": _number(orbit.held),
+            "lifted_fraction": _number(orbit.lifted),
+            "deepest_cut_ratio": _number(orbit.deepest),
+            "broken": None if orbit.broken is None else str(orbit.broken),
+        },
+        "forced_swing": found.floor,
+        "modes": [_mode_fields(swing, units) for swing in found.modes],
+    }
+
+
+def _mode_fields(swing: ModeSwing, units: Units) -> dict[str, Any]:
+    mode = swing.mode
+    return {
+        "number": mode.number,
+        "frequency": mode.root.imag / units.time,
+        "growth_rate": mode.root.real / units.time,
+        "own_damping": mode.damping * units.response,
+        "amplitudes": [_at_fields(each, swing, units) for each in swing.at],
+        "crossings": [
+            {"kind": each.kind, "amplitude": each.amplitude, "low": each.low, "high": each.high}
+            for each in swing.crossings
+        ],
+    }
+
+
+def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
+    response = each.response
+    value = response.value * units.response
+    return {
+        "amplitude": each.amplitude,
+        "frequency": response.frequency / units.time,
+        "response_re": _number(value.real),
+        "response_im": _number(value.imag),
+        "response_error": _number(response.error * units.response),
+        "response_scatter": _number(response.scatter * units.response),
+        "damping_left": _number(swing.mode.damping * units.response + value.real),
+        "growth_rate": _number(each.root.real / units.time),
+        "growth_rate_error": _number(each.error / units.time),
+        "sign": each.sign,
+        "weight_on_bit": _number(response.weight * units.weight),
+        "torque_on_bit": _number(response.torque * units.torque),
+        "held_fraction": _number(response.held),
+        "lifted_fraction": _number(response.lifted),
+        "periods": response.periods,
+        "ripple": response.ripple,
+        "broken": None if response.broken is None else str(response.broken),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def motion_summary(found: DrillingMotion) -> str:
+    """Return what is told on a terminal."""
+    units = units_of(found.case)
+    lines = [_orbit_text(found.orbit, units)]
+    for swing in found.modes:
+        lines += ["", *_mode_lines(swing, units)]
+    if found.floor is not None:
+        lines += [
+            "",
+            f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else.",
+        ]
+    return "\n".join(lines)
+
+
+def _orbit_text(orbit: AxialOrbit, units: Units) -> str:
+    if orbit.broken is not None:
+        return f"Axial orbit at steady rotation: none; {orbit.broken.sentence}."
+    if orbit.settles:
+        return "Axial motion at steady rotation: smooth drilling."
+    kind = "does not repeat"
+    if orbit.period is not None:
+        kind = f"repeats every {orbit.period * units.time:.4g}{' s' if units.rate_name else ''}"
+    loads = ""
+    if units.rate_name:
+        weight, torque = orbit.weight * units.weight, orbit.torque * units.torque
+        loads = f" ({weight / 1e3:.3g} kN, {torque / 1e3:.3g} kN·m)"
+    return (
+        f"Axial orbit at steady rotation: {kind}; held {orbit.held:.0%} of the time, off the rock "
+        f"{orbit.lifted:.0%}; cuts up to {orbit.deepest:.2f} of smooth drilling; mean weight "
+        f"{orbit.weight_ratio:.3f} and torque {orbit.torque_ratio:.3f} of it{loads}."
+    )
+
+
+def _mode_lines(swing: ModeSwing, units: Units) -> list[str]:
+    mode, rig = swing.mode, bool(units.rate_name)
+    place = mode.root.imag / units.time
+    frequency = f"{place / (2.0 * math.pi):.3f} Hz" if rig else f"ω = {place:.4g}"
+    unit = f" {units.response_name}" if rig else ""
+    lines = [
+        f"Torsional mode {mode.number}: {frequency}, own damping "
+        f"{mode.damping * units.response:.4g}{unit}",
+        f"{'A':>7} {'Re H':>9} {'Im H':>9} {'±':>7} {'damping left':>13} {'growth':>9} {'±':>8}"
+        f" {'held':>5} {'lifted':>6}",
+    ]
+    for each in swing.at:
+        response = each.response
+        if response.broken is not None:
+            lines.append(f"{each.amplitude:7.3f} {response.broken.sentence}")
+            continue
+        value, error = response.value * units.response, response.error * units.response
+        left = mode.damping * units.response + value.real
+        numbers = f"{value.real:9.4g} {value.imag:9.4g} {error:7.2g} {left:13.4g}"
+        growth = f"{each.root.real / units.time:9.4f} {each.error / units.time:8.2g}"
+        shares = f"{response.held:5.0%} {response.lifted:6.0%}"
+        lines.append(f"{each.amplitude:7.3f} {numbers} {growth} {shares}")
+    return [*lines, *verdict(swing)]
+
+
+def verdict(swing: ModeSwing) -> list[str]:
+    """Say which swings a mode has, and from which kicks."""
+    told = []
+    sure = [each for each in swing.at if each.sign]
+    if not sure:
+        return ["At no amplitude is it sure whether the mode grows: the simulator must decide."]
+    smallest, largest = sure[0], sure[-1]
+    if smallest.sign < 0:
+        told.append(f"Small swings decay (at A = {smallest.amplitude:.3g}).")
+    else:
+        told.append(f"Small swings grow (at A = {smallest.amplitude:.3g}).")
+    for crossing in swing.crossings:
+        between = f"between {crossing.low:.3g} and {crossing.high:.3g}"
+        told.append(
+            f"Swings by {crossing.amplitude:.3g} of the speed ({between})."
+            if crossing.kind == "swing"
+            else f"A kick beyond {crossing.amplitude:.3g} grows on ({between})."
+        )
+    if largest.sign > 0:
+        told.append(f"Grows at A = {largest.amplitude:.3g} still: until the bit sticks.")
+    unsure = [each.amplitude for each in swing.at if not each.sign]
+    if unsure:
+        listed = ", ".join(f"{a:.3g}" for a in unsure)
+        told.append(f"Not sure at A = {listed}: the simulator must decide there.")
+    return told

@@ -1,0 +1,284 @@
+"""The torque with which a bit on its axial orbit answers a change of its speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.motion.record import Halves, halves, windowed
+from drillctrl.motion.turning import Led, Turned
+from drillctrl.simulation.outcome import grows_without_bound
+from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.status import Outcome, Status
+
+# H is told to this, in units of sqrt(I Kt), unless it takes too long.
+TOLERANCE = 3e-3
+MOST_PERIODS, FEWEST_PERIODS = 400, 40
+# Axial kicks, over the rate of penetration, from which the orbit is reached: out of smooth
+# drilling, and off the rock.
+KICKS = (0.1, -2.0)
+# Periods of a half window. Half windows of a run that is gone on from, an even number; fewer
+# of a long string, whose history takes much memory.
+_PERIODS, _PER_RUN, _PER_LONG_RUN, _LONG = 4, 10, 2, 20
+_SETTLING = 10.0
+_SHORTEST, _LONGEST = 60.0, 500.0
+_SURE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class BitResponse:
+    """The answer of a bit to Ω = Ω0 (1 + A cos ωt).
+
+    Attributes
+    ----------
+    frequency : float
+        ω.
+    amplitude : float
+        A, share of the rotary speed, as it came out.
+    value : complex
+        H, amplitude of the torque on bit over that of the speed; a positive real part damps.
+        NaN where a run broke off. At −ω it is the conjugate.
+    error : float
+        Of |H|: twice the standard error of the mean over windows, or half the difference of
+        the two starts where that is more; infinite where a run broke off.
+    windows : complex array, (w,)
+        H in each window, those of one start after those of the other.
+    starts : complex array, (2,)
+        Means of each start. Where they differ by more than the scatter, there are two orbits.
+    weight, torque : float
+        Means of the loads on the bit.
+    held, lifted : float
+        Shares of the time: held at Z' = 0, and off the rock.
+    periods : int
+        Of ω, that were looked at.
+    ripple : bool
+        Whether the speed rippled beside the swing.
+    broken : Status, Outcome or None
+        Why a run broke off: its status, or that the bit bounces without bound, for which an
+        imposed rotation has power enough.
+    """
+
+    frequency: float
+    amplitude: float
+    value: complex
+    error: float
+    windows: ComplexArray = field(repr=False)
+    starts: ComplexArray = field(repr=False)
+    weight: float
+    torque: float
+    held: float
+    lifted: float
+    periods: int
+    ripple: bool = False
+    broken: Status | Outcome | None = None
+
+    @property
+    def scatter(self) -> float:
+        """Largest distance of H in a window from its mean; infinite where there is none."""
+        if self.broken is not None:
+            return math.inf
+        return float(np.abs(self.windows - self.value).max())
+
+
+def turned_case(where: Where, frequency: float, ripple: bool = False) -> Case:
+    """Return the motion of a case under a rotation that swings at a frequency.
+
+    It is imposed, and θ' at t = 0 sets it; or led, with ripple, and θ' of ``lead`` does.
+
+    Raises
+    ------
+    InputError
+        If there is no plant, or nothing is cut.
+    """
+    case = as_case(where)
+    plant, point = case.physics("the response of a bit")
+    if not point.delta0 > 0.0:
+        raise InputError("delta0", point.delta0, "above 0: a bit that cuts nothing has no orbit")
+    turning = Led(lead_frequency=frequency) if ripple else Turned(turning_frequency=frequency)
+    return Case(replace(plant, blocks=(*plant.blocks, turning)), point)
+
+
+def settling_time(case: Case) -> float:
+    """Return how long the axial orbit is waited for, by the damping of the string alone."""
+    axial = [0, 1, *range(4, case.motion().A.shape[0])]
+    slowest = -float(np.linalg.eigvals(case.motion().A[np.ix_(axial, axial)]).real.max())
+    return float(np.clip(_SETTLING / max(slowest, 1e-9), _SHORTEST, _LONGEST))
+
+
+def bit_response(
+    where: Where,
+    frequency: float,
+    amplitude: float,
+    *,
+    tolerance: float = TOLERANCE,
+    most_periods: int = MOST_PERIODS,
+    ripple: bool = False,
+    **options: Any,
+) -> BitResponse:
+    """Return the response H(iω, A) of a bit on its axial orbit.
+
+    The bit is turned at Ω0 (1 + A cos ωt), whatever the rock bears; only the axial motion is
+    simulated. When it has reached its orbit, the part of the torque at ω is taken over
+    windows of eight periods, from two starts.
+
+    Parameters
+    ----------
+    where : OperatingPoint, RigPoint or Case
+        What drills, and where.
+    frequency : float
+        ω > 0, dimensionless.
+    amplitude : float
+        A in (0, 1): the bit does not turn back.
+    tolerance : float
+        Error of H at which no more windows are looked at, in units of the torque per speed.
+    most_periods : int
+        So many periods of ω of each start are looked at where the error stays larger.
+    ripple : bool
+        Whether the speed is imposed at ω alone, so that the torque of the orbit makes it
+        ripple at all other frequencies, as far as the torsional string lets it; else the
+        rotation is imposed whole. With ripple A comes out a few per cent off what was asked.
+    **options
+        ``cutting``, ``rtol`` and others of `simulate`.
+
+    Returns
+    -------
+    BitResponse
+        In dimensionless units.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range, there is no plant, or its axial and torsional
+        motion are coupled elsewhere than at the bit.
+    """
+    frequency = checked_number("frequency", frequency, 0.0, 1e3, open_low=True)
+    amplitude = checked_number("amplitude", amplitude, 0.0, 0.999, open_low=True)
+    tolerance = checked_number("tolerance", tolerance, 0.0, 1e6, open_low=True)
+    most_periods = checked_integer("most_periods", most_periods, FEWEST_PERIODS, 1_000_000)
+    case = turned_case(where, frequency, ripple)
+    settling = settling_time(turned_case(where, frequency))
+    starts = [_Start(case, settling, frequency, amplitude, kick, options) for kick in KICKS]
+    while True:
+        for start in starts:
+            start.go_on()
+        found = _response(starts, frequency, amplitude, ripple)
+        periods = found.periods // len(starts)
+        if found.broken or found.error <= tolerance or periods >= most_periods:
+            return found
+
+
+class _Start:
+    """A run from one axial kick, gone on from as long as asked, and its windows."""
+
+    def __init__(
+        self,
+        case: Case,
+        settling: float,
+        frequency: float,
+        amplitude: float,
+        kick: float,
+        options: dict[str, Any],
+    ) -> None:
+        plant, point = case.physics("the response of a bit")
+        self.case, self.frequency, self.options = case, frequency, options
+        self.speed = amplitude * point.omega0
+        self.per_run = _PER_RUN if len(plant.state_names) <= _LONG else _PER_LONG_RUN
+        period = 2.0 * math.pi / frequency
+        self.half = _PERIODS * period
+        self.wait = period * math.ceil(settling / period)
+        initial = {"dx": kick * point.penetration_rate, "dtheta": self.speed}
+        if "dlead" in plant.state_names:
+            initial["dlead"] = self.speed
+        self.scenario = Scenario(initial=initial)
+        self.found: list[Halves] = []
+        self.broken: Status | Outcome | None = None
+
+    def go_on(self) -> None:
+        """Wait for the orbit if that was not done, and look at some more windows."""
+        piece = self.per_run * self.half
+        while self.wait > 0.0 and self.broken is None:
+            self._run(min(self.wait, piece))
+            self.wait = max(0.0, self.wait - piece)
+        for _ in range(_PER_RUN // self.per_run):
+            if self.broken is None:
+                run = self._run(piece)
+            if self.broken is None:
+                self.found.append(halves(run, 0.0, self.half, self.frequency))
+
+    def _run(self, duration: float) -> Simulation:
+        run = simulate(self.case, duration=duration, scenario=self.scenario, **self.options)
+        if run.status != Status.DONE:
+            self.broken = run.status
+        elif grows_without_bound(run, run.at(run.times, ("x", "dx", "dtheta"))):
+            self.broken = Outcome.DIVERGES
+        else:
+            self.scenario = Scenario(start=run.past())
+        return run
+
+    @property
+    def every(self) -> Halves:
+        """All halves of windows."""
+        return Halves(*[np.concatenate(parts) for parts in zip(*self.found, strict=True)])
+
+    @property
+    def speeds(self) -> ComplexArray:
+        """Amplitude of the speed in each window; each run begins at phase 0."""
+        return windowed(self.every.speeds)
+
+    @property
+    def windows(self) -> ComplexArray:
+        """H in each window."""
+        return windowed(self.every.torques) / self.speeds
+
+
+def _response(
+    starts: list[_Start], frequency: float, amplitude: float, ripple: bool
+) -> BitResponse:
+    """Return what the windows so far say."""
+    broken = [start.broken for start in starts if start.broken is not None]
+    if broken:
+        return BitResponse(
+            frequency, amplitude, complex(math.nan, math.nan), math.inf,
+            np.zeros(0, dtype=complex), np.full(len(starts), np.nan + 0j),
+            math.nan, math.nan, math.nan, math.nan, 0, ripple, broken[0],
+        )  # fmt: skip
+    by_start = [start.windows for start in starts]
+    windows = np.concatenate(by_start)
+    means = np.array([each.mean() for each in by_start])
+    value = complex(means.mean())
+    # Windows that overlap by half are as good as independent.
+    within = np.concatenate([each - mean for each, mean in zip(by_start, means, strict=True)])
+    freedom = max(windows.size - len(starts), 1)
+    deviation = math.sqrt(float((np.abs(within) ** 2).sum()) / freedom)
+    error = max(_SURE * deviation / math.sqrt(windows.size), float(np.abs(means - value).max()))
+    every = [start.every for start in starts]
+    weight, torque, held, lifted = (
+        float(np.concatenate([getattr(each, name) for each in every]).mean())
+        for name in ("weight", "torque", "held", "lifted")
+    )
+    _, point = starts[0].case.physics("the response of a bit")
+    swings = np.concatenate([np.abs(start.speeds) for start in starts])
+    amplitude = float(swings.mean()) / point.omega0
+    periods = _PERIODS * sum(each.weight.size for each in every)
+    return BitResponse(
+        frequency,
+        amplitude,
+        value,
+        error,
+        windows,
+        means,
+        weight,
+        torque,
+        held,
+        lifted,
+        periods,
+        ripple,
+    )
