@@ -10,6 +10,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.bounds import rate_bounds
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
@@ -61,7 +62,7 @@ def settings_for(
     real[[data.BY_WEIGHT, data.BY_TORQUE]] = arrays.E[1, 0], arrays.E[3, 1]
     real[[data.RTOL, data.ATOL]] = rtol, atol
     real[data.SCALE : data.LIMITS] = _scales(structure)
-    real[data.LIMITS :] = np.inf
+    real[data.BOUNDS : data.SCALE] = real[data.LIMITS :] = np.inf
     schedule, K1, K2 = np.zeros((1, 2)), np.zeros((1, m, p)), np.zeros((1, m, p))
     fed, noise = np.zeros(0, dtype=np.int64), np.zeros((0, p))
     if linear:
@@ -206,6 +207,7 @@ def check_start(
 
 
 def begin(
+    point: OperatingPoint,
     structure: Structure,
     controller: Controller | None,
     settings: data.Settings,
@@ -216,7 +218,8 @@ def begin(
 
     Before t = 0 there is step 0: steady drilling, or flat rock under a bit at rest (which
     is any motion with constant Z; the delay it implies is that of steady drilling); and the
-    steps of a run that is gone on from. The start has passed `check_start`.
+    steps of a run that is gone on from. The start has passed `check_start`. What bounds the
+    motion from there is written into the settings.
     """
     march, control = (kernel(name, structure.physics) for name in ("march", "control"))
     standing = (
@@ -239,6 +242,10 @@ def begin(
     if controller is not None and controller.activation == 0.0:
         # What the drive gives at this instant is where its limits of rate begin.
         y[n + m : n + 2 * m] = y[n : n + m]
+    if not settings.whole[data.LINEAR]:
+        settings.real[data.BOUNDS : data.SCALE] = rate_bounds(
+            point, structure.arrays.steady, settings.drive, y[: n + m]
+        )
     control.take_sample(settings, history, first, ints, reals, 0.0, y)
     work = march.workplace(settings)
     march.enter(settings, history, first, ints, chain, data.BEGIN, 0.0, y, work)

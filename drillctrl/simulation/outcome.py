@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.bounds import BEYOND, rate_scales
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
 
@@ -23,8 +24,8 @@ _SETTLED, _SETTLING, _FALLING = 1e-3, 2e-2, 0.7
 _KEEPS_UP = 0.9
 # Mean weight on bit over the steady one beyond which the bit has fallen behind.
 _PRESSED = 2.0
-# Multiples of a rig's own scale of speed that no bounded motion of it reaches.
-_BEYOND, _LARGE = 20.0, 3.0
+# Multiples of a rig's own scale of speed that a motion which grows has passed.
+_LARGE = 3.0
 _PER_STEP = 5
 
 
@@ -98,12 +99,12 @@ def figures(run: Simulation) -> Figures:
 def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
     """Whether a rate has gone beyond anything that a bounded motion of the rig reaches.
 
-    The scale is the imposed rate and that with which the string springs back when the steady
-    load on the bit is gone: twist T/Kt at the frequency of torsion, stretch W/Ka at that of
-    the axial motion. Beyond a few times that, a run that broke off at its step limit grew if
-    its amplitude did from each quarter to the next. A bit that falls behind is loaded by what
-    it lags behind on the mean, so that its rates are judged by that load.
+    The scale is that of `rate_scales`. Beyond a few times that, a run that broke off at its
+    step limit grew if its amplitude did from each quarter to the next. A bit that falls behind
+    is loaded by what it lags behind on the mean, so that its rates are judged by that load.
     """
+    if run.status == Status.DIVERGED:
+        return True
     motion = run.motion if motion is None else motion
     weight, torque = run.steady_load
     p = run.point
@@ -111,10 +112,10 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
         # Of a linear motion, which swings to both sides, the mean says nothing.
         mean = float(np.trapezoid(motion.x, motion.times)) / max(float(run.times[-1]), 1e-300)
         weight += p.eta**2 * max(0.0, -mean)
-    axial = p.penetration_rate + weight / p.eta if p.eta > 0.0 else np.inf
-    for rate, limit in ((motion.dx, axial), (motion.dtheta, p.omega0 + torque)):
+    scales = rate_scales(p, weight, torque)
+    for rate, limit in zip((motion.dx, motion.dtheta), scales, strict=True):
         sizes = [float(np.abs(rate[part]).max(initial=0.0)) for part in _quarters(motion.times)]
-        if not max(sizes) <= _BEYOND * limit:
+        if not max(sizes) <= BEYOND * limit:
             return True
         rising = all(a < b for a, b in itertools.pairwise(sizes)) and sizes[-1] > 2.0 * sizes[0]
         if run.status == Status.STEP_LIMIT and rising and sizes[-1] > _LARGE * limit:

@@ -180,7 +180,9 @@ def simulate(
         rtol=rtol,
         atol=atol,
     )
-    standing = begin(structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1))
+    standing = begin(
+        point, structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1)
+    )
     march = kernel("march", structure.physics)
     status = {
         data.DONE: Status.DONE,
@@ -188,6 +190,7 @@ def simulate(
         data.REVERSED: Status.REVERSED,
         data.TOO_DEEP: Status.TOO_DEEP,
         data.NOT_FINITE: Status.NOT_FINITE,
+        data.DIVERGED: Status.DIVERGED,
         data.PAUSED: Status.TIME_LIMIT,
     }
     started = time.perf_counter()

@@ -24,6 +24,7 @@ class Status(_Told):
     DONE = "done", "the run lasted as long as was asked"
     REVERSED = "reverse rotation", "the bit turned backwards, for which the model has no face"
     STEP_LIMIT = "step limit", "the steps that were permitted are used up"
+    DIVERGED = "diverges", "the motion grew beyond what a bounded motion of the rig reaches"
     TIME_LIMIT = "time limit", "the wall time that was permitted is used up"
     COLLAPSE = "step collapse", "no step is short enough for the error that was asked"
     TOO_DEEP = "face too old", "what the bit would meet was cut before all that is kept"

@@ -19,7 +19,16 @@ from drillctrl.simulation.run import simulate
 from drillctrl.simulation.status import Status
 from drillctrl.spectrum.roots import spectral_abscissa
 
-OUTCOMES = ("settled", "orbit", "unsettled", "stalled", "reverse rotation", "undecided", "broken")
+OUTCOMES = (
+    "settled",
+    "orbit",
+    "unsettled",
+    "stalled",
+    "reverse rotation",
+    "diverges",
+    "undecided",
+    "broken",
+)
 # Decay times that a run lasts: exp(−9) by the end of its third quarter is well settled.
 _LASTING = 12.0
 _SHORTEST, _LONGEST = 60.0, 600.0

@@ -24,7 +24,7 @@ BARRIER, BEGIN = 7, 8
 AT_LIMIT = 9
 
 # How the march stopped.
-DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE, PAUSED = range(7)
+DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE, PAUSED, DIVERGED = range(8)
 
 # A break of level L is a jump of the L-th derivative of x or θ. The pair of order 5 keeps its
 # order across breaks of a higher level than this in what is delayed.
@@ -41,10 +41,11 @@ STATES, INPUTS, OUTPUTS = 0, 1, 2
 # what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1].
 WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
 # The controller's clock; errors allowed; constant delays of the linear model and of the
-# measured signal, 0 where there is none; size of each event function, to tell zero from
-# rounding, and that of the last ones: the limits of inputs (m) and of their rates (m).
+# measured signal, 0 where there is none; bounds of x' and θ' (two each: at t = 0, and what
+# they gain by time); size of each event function, to tell zero from rounding, and that of the
+# last ones: the limits of inputs (m) and of their rates (m).
 T_ON, MEASURE_DELAY, PERIOD, LAG_TIME, RTOL, ATOL, LAGS = 5, 6, 7, 8, 9, 10, 11
-SCALE = 13
+BOUNDS, SCALE = 13, 17
 LIMITS = SCALE + AT_LIMIT
 # Columns of `schedule`.
 SINCE, PAST_AGE = 0, 1

@@ -17,8 +17,10 @@ from .data import (
     ACTUATOR,
     AT_LIMIT,
     BARRIER,
+    BOUNDS,
     COLLAPSE,
     CURRENT_DELAY,
+    DIVERGED,
     DONE,
     END,
     FEEDBACK,
@@ -175,6 +177,16 @@ def turned_by(settings, t, theta):
     return 1.0 + abs(theta) + rates((0.0, 0.0, 0.0, 0.0), settings.bit)[1] * abs(t)
 
 
+@inner
+def out_of_bounds(settings, t, y):
+    """Whether a rate of the bit is beyond what a bounded motion reaches."""
+    real = settings.real
+    return (
+        abs(y[1]) > real[BOUNDS] + real[BOUNDS + 1] * t
+        or abs(y[3]) > real[BOUNDS + 2] + real[BOUNDS + 3] * t
+    )
+
+
 @entry
 def march(settings, history, ints, reals, y, chain, following, end, max_step, tries):
     """Integrate until ``end`` or until the history is full.
@@ -195,7 +207,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
     Returns
     -------
     int
-        Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP or NOT_FINITE.
+        Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE or
+        DIVERGED.
     """
     bit, size = settings.bit, moving(settings)
     linear = settings.whole[LINEAR] == 1
@@ -211,6 +224,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         t, steps = reals[TIME], ints[STEPS]
         if t >= end:
             return DONE
+        if out_of_bounds(settings, t, y):
+            return DIVERGED
         if steps + 1 >= history.real.shape[0]:
             return MORE_ROOM
         if ints[I_TORSION] == REVERSE:
