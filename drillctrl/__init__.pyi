@@ -25,6 +25,7 @@ from .delay.structure import Tie as Tie
 from .delay.system import DelaySystem as DelaySystem
 from .designs.design import analyze as analyze
 from .designs.design import design as design
+from .designs.drilling import Drilling as Drilling
 from .designs.loop_analysis import LoopAnalysis as LoopAnalysis
 from .designs.loop_analysis import analyze_loop as analyze_loop
 from .designs.loops import spectral_abscissas as spectral_abscissas
@@ -76,6 +77,7 @@ from .interop.lifted import pade_approximation as pade_approximation
 from .interop.plants import from_control as from_control
 from .interop.responses import loop_frd as loop_frd
 from .interop.responses import to_frd as to_frd
+from .motion.loop import torsional_system as torsional_system
 from .motion.orbit import AxialOrbit as AxialOrbit
 from .motion.orbit import axial_orbit as axial_orbit
 from .motion.response import BitResponse as BitResponse

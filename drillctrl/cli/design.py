@@ -22,6 +22,7 @@ from drillctrl.cli.roots import (
     trials_option,
     wants_trials,
 )
+from drillctrl.cli.scenario import SURROUNDINGS, read_surroundings, surroundings_options
 from drillctrl.cli.verb import Verb
 
 
@@ -48,12 +49,15 @@ from drillctrl.cli.verb import Verb
     help="Exit with 3 if nothing stabilises or is recommended, or a requirement is not met.",
 )
 @trials_option("all")
+@surroundings_options
+@click.option("--workers", type=int, default=1, show_default=True, help="Processes (drilling).")
 @root_output_options
 def design_command(
     structure: str,
     bound: tuple[str, ...],
     seed: int,
     trials: str,
+    workers: int,
     require_stable: bool,
     prove: bool,
     as_json: bool,
@@ -63,14 +67,19 @@ def design_command(
 ) -> None:
     """Find the gains within bounds that make vibrations decay fastest.
 
+    Where none make smooth drilling stable, the gains are those that make torsional swings decay
+    on the motion that is drilled with, as far as trial runs bear it out.
+
     \b
     Examples:
       drillctrl design --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case2
       drillctrl design --omega0 10 --delta0 12 --psi 14 --bound K1=-5:5 --json
+      drillctrl design --rig table1 --speed "80 rpm" --rop "30 m/h" --limit "0.9 kN*m"
       drillctrl design --objective worst-case --psi-error 0.2 --min-decay 0.1
     """
     check_outputs(out, plot)
     objective, requirements = read_objective(options), read_requirements(options)
+    surroundings = {name: options.pop(name) for name in SURROUNDINGS}
     where = read_point(options)
     from drillctrl.designs.design import design
     from drillctrl.drilling.structures import as_structure
@@ -84,8 +93,12 @@ def design_command(
         requirements=requirements,
         seed=seed,
         trials=wants_trials(trials),
+        surroundings=read_surroundings(surroundings, getattr(where, "rig", None)),
+        workers=workers,
     )
+    on_motion = result.on_motion is not None
     deliver(result, prove, as_json, out, plot)
-    met = result.stable and result.requirements_met and not result.verdict.refused
+    good = result.recommended is True if on_motion else result.stable
+    met = good and result.requirements_met and not result.verdict.refused
     if require_stable and not met:
         raise click.exceptions.Exit(NOT_STABILISED)

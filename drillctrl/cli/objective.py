@@ -15,9 +15,11 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 # Options that belong to one objective, and the parameter of it that they set.
+_ERRORS = {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"}
 _BELONGS = {
     "semidiscrete": {"m": "m", "order": "order"},
-    "worst-case": {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"},
+    "worst-case": _ERRORS,
+    "drilling": {**_ERRORS, "kick": "kick", "modes": "modes"},
     "robust": {"epsilon": "epsilon"},
 }
 _REQUIREMENTS = {
@@ -32,17 +34,21 @@ def objective_options(command: Command) -> Command:
     options = [
         click.option(
             "--objective",
-            default="exact",
-            show_default=True,
-            help="exact: α; semidiscrete: ρ(D); worst-case: largest α when the point is off; "
-            "robust: largest Re s when the plant's matrices are off.",
+            help="exact: α; drilling: growth of torsional swings on the motion that is drilled "
+            "with; semidiscrete: ρ(D); worst-case: largest α when the point is off; robust: "
+            "largest Re s when the plant's matrices are off. Without it exact, and drilling where "
+            "that does not stabilise.",
         ),
         click.option("--m", type=int, help="Intervals (semidiscrete; default 40)."),
         click.option("--order", type=int, help="0, 1 or 2 (semidiscrete; default 0)."),
-        click.option("--psi-error", type=float, help="Relative (worst-case; default 0.05)."),
-        click.option("--delta0-error", type=float, help="Relative (worst-case; default 0)."),
-        click.option("--omega0-error", type=float, help="Relative (worst-case; default 0)."),
+        click.option(
+            "--psi-error", type=float, help="Relative (worst-case: default 0.05; drilling: 0)."
+        ),
+        click.option("--delta0-error", type=float, help="Relative (worst-case, drilling; 0)."),
+        click.option("--omega0-error", type=float, help="Relative (worst-case, drilling; 0)."),
         click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
+        click.option("--kick", type=float, help="Largest swing of the speed (drilling; 0.45)."),
+        click.option("--modes", type=int, help="Torsional modes (drilling; default 1)."),
     ]
     for option in reversed(options):
         command = option(command)
@@ -74,34 +80,35 @@ def read_requirements(options: dict[str, Any]) -> Requirements:
     )
 
 
-def read_objective(options: dict[str, Any]) -> Objective:
-    """Take the options of `objective_options` out of a mapping.
+def read_objective(options: dict[str, Any]) -> Objective | None:
+    """Take the options of `objective_options` out of a mapping; None where none was chosen.
 
     Raises
     ------
     InputError
         If the objective is unknown, or an option belongs to another one.
     """
+    from drillctrl.designs.drilling import Drilling
     from drillctrl.designs.worst_case import WorstCase
     from drillctrl.synthesis.objectives import Exact, Robust, SemiDiscrete
 
     kinds: dict[str, Callable[..., Objective]] = {
         "exact": Exact,
+        "drilling": Drilling,
         "semidiscrete": SemiDiscrete,
         "worst-case": WorstCase,
         "robust": Robust,
     }
     name = options.pop("objective")
-    if name not in kinds:
+    if name is not None and name not in kinds:
         raise InputError("--objective", name, f"one of {', '.join(kinds)}")
-    chosen = {}
-    for owner, names in _BELONGS.items():
-        for option, parameter in names.items():
-            value = options.pop(option)
-            if value is None:
-                continue
-            if owner != name:
-                flag = "--" + option.replace("_", "-")
-                raise InputError(flag, value, f"left out unless --objective is {owner}")
-            chosen[parameter] = value
-    return kinds[name](**chosen)
+    known = {option for names in _BELONGS.values() for option in names}
+    given = {option: value for option in known if (value := options.pop(option)) is not None}
+    mine = _BELONGS.get(name, {})
+    for option, value in sorted(given.items()):
+        if option not in mine:
+            owners = [owner for owner, names in _BELONGS.items() if option in names]
+            flag = "--" + option.replace("_", "-")
+            raise InputError(flag, value, f"left out unless --objective is {' or '.join(owners)}")
+    chosen = {mine[option]: value for option, value in given.items()}
+    return None if name is None else kinds[name](**chosen)

@@ -23,6 +23,22 @@ _CHANGE = (
     "such as 't=50,omega0=9,duration=10' (omega0, v0, psi; of a rig: speed, rop, rock-strength)"
 )
 
+SURROUNDINGS = ("period", "measurement_delay", "actuator_lag", "limit", "rate_limit")
+_SURROUNDINGS = (
+    click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
+    click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
+    click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
+    click.option("--limit", metavar="TORQUE", help="Largest |u|: 3, or '5 kN*m' with a rig."),
+    click.option("--rate-limit", metavar="RATE", help="Fastest change of u: 5, or '50 kN*m/s'."),
+)
+
+
+def surroundings_options(command: Command) -> Command:
+    """Add the options that say what surrounds a controller: clock, delays and limits."""
+    for option in reversed(_SURROUNDINGS):
+        command = option(command)
+    return command
+
 
 def controller_options(command: Command) -> Command:
     """Add the options that say what closes the loop."""
@@ -40,13 +56,7 @@ def controller_options(command: Command) -> Command:
             "--delay", default="fixed", show_default=True,
             help="Delayed outputs: fixed (τ0 ago) or current (τ ago).",
         ),
-        click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
-        click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
-        click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
-        click.option("--limit", metavar="TORQUE", help="Largest |u|: 3, or '5 kN*m' with a rig."),
-        click.option(
-            "--rate-limit", metavar="RATE", help="Fastest change of u: 5, or '50 kN*m/s'."
-        ),
+        *_SURROUNDINGS,
         click.option(
             "--noise", default="", metavar="NAME=DEVIATION",
             help="On each sample, such as theta=0.01,dtheta=0.1.",
@@ -134,6 +144,33 @@ def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:
     return Change(**arguments)
 
 
+def read_surroundings(options: Mapping[str, Any], rig: Rig | None) -> dict[str, float]:
+    """Return what `surroundings_options` say, dimensionless.
+
+    Raises
+    ------
+    InputError
+        If a unit is missing or does not fit.
+    """
+    from drillctrl.base import units
+
+    given: dict[str, float] = {}
+    time = 1.0 if rig is None else rig.time_scale
+    torque = 1.0 if rig is None else rig.torsional_stiffness
+    for name, dimension, unit in (
+        ("period", units.TIME, time),
+        ("measurement_delay", units.TIME, time),
+        ("actuator_lag", units.TIME, time),
+        ("limit", units.TORQUE, torque),
+        ("rate_limit", units.TORQUE_RATE, torque / time),
+    ):
+        if options[name] is not None:
+            option = f"--{name.replace('_', '-')}"
+            known = None if rig is None else unit
+            given[name] = read_quantity(option, options[name], dimension, known) / unit
+    return given
+
+
 def read_controller(
     options: Mapping[str, Any],
     where: OperatingPoint | RigPoint,
@@ -149,24 +186,10 @@ def read_controller(
     InputError
         If an option is missing, or one is given that needs another.
     """
-    from drillctrl.base import units
-
     given: dict[str, Any] = {}
     if options["activation"] is not None:
         given["activation"] = read_time("--activation", options["activation"], rig)
-    time = 1.0 if rig is None else rig.time_scale
-    torque = 1.0 if rig is None else rig.torsional_stiffness
-    for name, dimension, unit in (
-        ("period", units.TIME, time),
-        ("measurement_delay", units.TIME, time),
-        ("actuator_lag", units.TIME, time),
-        ("limit", units.TORQUE, torque),
-        ("rate_limit", units.TORQUE_RATE, torque / time),
-    ):
-        if options[name] is not None:
-            option = f"--{name.replace('_', '-')}"
-            known = None if rig is None else unit
-            given[name] = read_quantity(option, options[name], dimension, known) / unit
+    given.update(read_surroundings(options, rig))
     if options["noise"]:
         given["noise"] = read_numbers("--noise", options["noise"], "theta=0.01,dtheta=0.1")
         given["seed"] = options["seed"]

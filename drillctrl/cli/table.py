@@ -144,6 +144,7 @@ def _design(
     """Return the table that the options ask for, where its designs are kept, and its units."""
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.base.workers import open_executor
+    from drillctrl.designs.drilling import Drilling
     from drillctrl.drilling.structures import preset_structure
     from drillctrl.synthesis.objectives import Exact
     from drillctrl.tables.table import table
@@ -155,7 +156,9 @@ def _design(
             raise InputError("workers", workers, "left out with --scheduler, which has its own")
     smooth = checked_number("smooth", options["smooth"], 0.0, 90.0)
     trials = wants_trials(options["trials"])
-    objective = read_objective(options)
+    objective = read_objective(options) or Exact()
+    if isinstance(objective, Drilling):
+        raise InputError("--objective", objective.name, "another one in tables")
     if smooth and not isinstance(objective, Exact):
         raise InputError("smooth", smooth, f"0 with --objective {objective.name}")
     grid = read_grid(options)

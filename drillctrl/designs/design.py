@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,16 +14,22 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER
-from drillctrl.designs.result import Analysis, Design, assess
+from drillctrl.designs.motion_design import fits_motion, motion_design, why_not_smooth
+from drillctrl.designs.result import Analysis, Design, analysis_fields, assess
 from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.worst_case import WorstCase
-from drillctrl.drilling.case import Where, as_case
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.structures import as_structure
+from drillctrl.simulation.controller import Controller
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis import problem
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
+
+# States of a plant whose motion is measured without being asked.
+_FEW = 12
 
 
 def design(
@@ -30,12 +37,17 @@ def design(
     structure: str | FeedbackStructure = "case1",
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
-    objective: Objective = EXACT,
+    objective: Objective | None = None,
     requirements: Requirements = NO_REQUIREMENTS,
     seed: int = 0,
     trials: bool | None = True,
+    surroundings: Mapping[str, Any] | None = None,
+    workers: int = 1,
 ) -> Design:
-    """Design bounded gains that minimise the spectral abscissa of the closed loop.
+    """Design bounded gains.
+
+    They minimise the spectral abscissa of the closed loop; where that leaves smooth drilling
+    unstable, the growth of torsional swings on the motion that is drilled with instead.
 
     Parameters
     ----------
@@ -45,14 +57,19 @@ def design(
         A preset (``"p"``, ``"case1"``, ``"pd"``, ``"case2"``) or a structure.
     bounds : mapping, optional
         Bounds that replace those of the structure; see `FeedbackStructure.with_bounds`.
-    objective : Exact, SemiDiscrete, WorstCase, Robust or HInfinity
-        What to minimise instead of the spectral abscissa.
+    objective : Exact, Drilling, SemiDiscrete, WorstCase, Robust or HInfinity, optional
+        What to minimise. Without one, `Exact`, and `Drilling` where that does not stabilise a
+        plant of few states and trial runs are made.
     requirements : Requirements
         What must hold beside the bounds.
     seed : int
         Of the starting points. The same seed gives the same gains.
     trials : bool, optional
         Whether the gains are then tried on the nonlinear motion, beside no control.
+    surroundings : mapping, optional
+        Attributes of the `Controller` in these runs: limits, clock, delays.
+    workers : int
+        Processes that share the runs of `Drilling`.
 
     Returns
     -------
@@ -70,7 +87,27 @@ def design(
     began = time.perf_counter()
     chosen = as_structure(structure).with_bounds(bounds or {})
     checked_integer("seed", seed, 0, 2**63 - 1)
-    case = as_case(point)
+    workers = checked_integer("workers", workers, 1, 1000)
+    case, around = as_case(point), dict(surroundings or {})
+    # Names and ranges are checked before any work is done.
+    Controller(chosen, *chosen.gains(chosen.lower), **around)
+
+    def on_motion(objective: Drilling, why: str = ASKED) -> Design:
+        return motion_design(
+            case,
+            chosen,
+            objective,
+            requirements,
+            seed=seed,
+            trials=bool(trials),
+            surroundings=around,
+            workers=workers,
+            why=why,
+        )
+
+    if isinstance(objective, Drilling):
+        return on_motion(objective)
+    free, objective = objective is None, EXACT if objective is None else objective
     family = loop_family(case.system(chosen.inputs), chosen)
     others = []
     if isinstance(objective, WorstCase):
@@ -81,9 +118,12 @@ def design(
     result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
     value = problem.reported_value(family, objective, solution.gains)
+    if free and trials and not result.stable and _few(case) and fits_motion(case, chosen):
+        made = on_motion(Drilling(), why_not_smooth(result))
+        return replace(made, elapsed_seconds=time.perf_counter() - began)
     if trials:
-        result = result.tried()
-    known = {item.name: getattr(result, item.name) for item in fields(Analysis)}
+        result = result.tried(**around)
+    known = analysis_fields(result)
     known["elapsed_seconds"] = time.perf_counter() - began
     return Design(
         **known,
@@ -94,6 +134,11 @@ def design(
         optimality=solution.optimality,
         evaluations=solution.evaluations,
     )
+
+
+def _few(case: Case) -> bool:
+    """Whether a plant has so few states that its motion is measured within seconds."""
+    return case.plant is not None and len(case.plant.state_names) <= _FEW
 
 
 def _meets(

@@ -54,6 +54,7 @@ def design_fields(design: DesignValues) -> dict[str, Any]:
         "met": design.requirements_met,
     }
     fields["evaluations"] = design.evaluations
+    fields["on_motion"] = None if design.on_motion is None else design.on_motion.to_dict()
     return fields
 
 

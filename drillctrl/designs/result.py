@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from drillctrl.base.arrays import FloatArray
@@ -49,16 +49,24 @@ class Analysis(AnalysisValues):
         Wall time.
     """
 
-    def tried(self, uncontrolled: dict[str, Figures] | None = None) -> Self:
+    def tried(self, uncontrolled: dict[str, Figures] | None = None, **surroundings: Any) -> Self:
         """Return the same gains after trial runs on the nonlinear motion.
 
         Parameters
         ----------
         uncontrolled : dict, optional
             What `uncontrolled_runs` returned for the point.
+        **surroundings
+            Attributes of `Controller`: limits, clock, delays.
         """
         verdict = try_gains(
-            self.case, self.structure, self.K1, self.K2, self.stable, uncontrolled=uncontrolled
+            self.case,
+            self.structure,
+            self.K1,
+            self.K2,
+            self.stable,
+            uncontrolled=uncontrolled,
+            surroundings=surroundings,
         )
         return replace(self, verdict=verdict)
 
@@ -120,6 +128,8 @@ class Design(DesignValues, Analysis):
         Evidence that no better gains lie within the bounds.
     evaluations : int
         Eigenvalue problems that the search solved.
+    on_motion : OnMotion or None
+        What the gains do on the motion that is drilled with, where that was designed for.
     """
 
     def to_dict(self) -> dict[str, Any]:
@@ -129,6 +139,11 @@ class Design(DesignValues, Analysis):
     def summary(self) -> str:
         """Return a text for people, in rig units too where a rig was given."""
         return set_out(design_lines(self))
+
+
+def analysis_fields(result: Analysis) -> dict[str, Any]:
+    """Return the values of an analysis by name, to make a `Design` of them."""
+    return {item.name: getattr(result, item.name) for item in fields(Analysis)}
 
 
 def assess(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,18 +39,33 @@ class Start:
         What it is called.
     feed, speed : float
         Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
+    text : str
+        In words.
     """
 
     name: str
     feed: float
     speed: float
+    text: str
 
     def initial(self, point: OperatingPoint) -> dict[str, float]:
         """Return the perturbation by state name."""
         return {"dx": self.feed * point.penetration_rate, "dtheta": self.speed * point.omega0}
 
 
-STARTS = (Start("small", 0.05, 0.1), Start("kick", 0.5, 0.5), Start("back", 0.5, -0.5))
+STARTS = (
+    Start("small", 0.05, 0.1, "a small disturbance"),
+    Start("kick", 0.5, 0.5, "a kick forward by half the speed"),
+    Start("back", 0.5, -0.5, "a kick back by half the speed"),
+)
+# Irregular motions depend on how they start more than on the gains: what is chosen by runs is
+# tried from these too.
+MORE_STARTS = (
+    Start("halted", -1.0, -0.999, "a bit that stands still"),
+    Start("strong", 1.0, 0.7, "a kick forward by 70 % of the speed"),
+    Start("nudge", 0.2, 0.25, "a kick forward by a quarter of the speed"),
+    Start("nudge back", 0.2, -0.25, "a kick back by a quarter of the speed"),
+)
 
 
 @dataclass(frozen=True)
@@ -59,15 +74,15 @@ class Trial:
 
     Attributes
     ----------
-    start : str
-        Name of the start.
+    start : Start
+        Where it began.
     controlled : Figures
         With the gains.
     uncontrolled : Figures or None
         Without; None where nothing depended on it.
     """
 
-    start: str
+    start: Start
     controlled: Figures
     uncontrolled: Figures | None
 
@@ -75,7 +90,7 @@ class Trial:
         """Return the JSON fields."""
         free = self.uncontrolled
         return {
-            "start": self.start,
+            "start": self.start.name,
             "controlled": self.controlled.to_dict(),
             "uncontrolled": None if free is None else free.to_dict(),
         }
@@ -111,10 +126,10 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
     return run
 
 
-def uncontrolled_runs(where: Where) -> dict[str, Figures]:
+def uncontrolled_runs(where: Where, starts: Sequence[Start] = STARTS) -> dict[str, Figures]:
     """Return what becomes of every start without control, by its name."""
     case = as_case(where)
-    return {start.name: trial_run(case, None, start) for start in STARTS}
+    return {start.name: trial_run(case, None, start) for start in starts}
 
 
 def trial_runs(
@@ -123,6 +138,7 @@ def trial_runs(
     *,
     uncontrolled: dict[str, Figures] | None = None,
     spare: bool = False,
+    starts: Sequence[Start] = STARTS,
 ) -> tuple[Trial, ...]:
     """Try a controller from every start, beside the same runs without it.
 
@@ -137,8 +153,10 @@ def trial_runs(
     spare : bool
         Leave out runs on which no verdict depends: those without control where the controller
         settles, and all further ones once it does harm.
+    starts : sequence of Start
+        From where.
     """
-    return tuple(_trials(case, controller, uncontrolled, spare))
+    return tuple(_trials(case, controller, uncontrolled, spare, starts))
 
 
 def _trials(
@@ -146,8 +164,9 @@ def _trials(
     controller: Controller,
     uncontrolled: dict[str, Figures] | None,
     spare: bool,
+    starts: Sequence[Start],
 ) -> Iterable[Trial]:
-    for start in STARTS:
+    for start in starts:
         mine = trial_run(case, controller, start)
         harm = mine.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES)
         if uncontrolled is not None:
@@ -156,6 +175,6 @@ def _trials(
             free = None
         else:
             free = trial_run(case, None, start)
-        yield Trial(start.name, mine, free)
+        yield Trial(start, mine, free)
         if spare and harm:
             return

@@ -8,6 +8,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
+from drillctrl.designs.drilling import OnMotion
 from drillctrl.designs.loop_analysis import LoopAnalysis, SpectralRadius
 from drillctrl.designs.mode_shift import ModeShift
 from drillctrl.designs.trials import Trial
@@ -120,6 +121,8 @@ class DesignValues(AnalysisValues):
         Evidence that no better gains lie within the bounds.
     evaluations : int
         Eigenvalue problems that the search solved.
+    on_motion : OnMotion or None
+        What the gains do on the motion that is drilled with, where that was designed for.
     """
 
     objective: Objective = field(kw_only=True)
@@ -128,6 +131,7 @@ class DesignValues(AnalysisValues):
     requirements_met: bool = field(default=True, kw_only=True)
     optimality: OptimalityCertificate = field(kw_only=True)
     evaluations: int = field(default=0, kw_only=True)
+    on_motion: OnMotion | None = field(default=None, kw_only=True)
 
     @property
     def minimises_alpha(self) -> bool:

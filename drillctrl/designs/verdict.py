@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
@@ -18,12 +21,12 @@ from drillctrl.simulation.structure import structure_of
 # Differences between two runs below which they are alike: irregular motions repeat their
 # figures no better.
 _SWING, _STUCK, _FEED = 0.02, 0.02, 0.05
-_SEVERITY = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
-_STARTS = {
-    "small": "a small disturbance",
-    "kick": "a kick forward by half the speed",
-    "back": "a kick back by half the speed",
-}
+# Swings that are not alike at all, and rates of decay that are alike.
+_APART, _RATE = 0.1, 0.01
+# Less swing that is good where the bit sticks and slips still.
+_HALF = 0.5
+SEVERITY = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
+_QUIET = (Outcome.SETTLES, Outcome.ORBIT, Outcome.BOUNCES)
 NO_GAINS = "there is no feedback to try"
 LEFT_OUT = "the gains have not been tried on the nonlinear motion"
 
@@ -40,11 +43,14 @@ class Verdict:
         One sentence.
     trials : tuple of Trial
         What was run; empty where nothing was.
+    harm : bool
+        Whether from some start the motion is worse than without control.
     """
 
     recommended: bool | None
     reason: str
     trials: tuple[Trial, ...] = ()
+    harm: bool = False
 
     @property
     def refused(self) -> bool:
@@ -64,6 +70,7 @@ def try_gains(
     *,
     uncontrolled: dict[str, Figures] | None = None,
     spare: bool = False,
+    surroundings: Mapping[str, Any] | None = None,
 ) -> Verdict:
     """Try gains on the nonlinear motion, and judge them.
 
@@ -77,13 +84,15 @@ def try_gains(
         Whether the linear loop is.
     uncontrolled, spare
         As in `trial_runs`.
+    surroundings : mapping, optional
+        Attributes of the `Controller` that closes the loop: limits, clock, delays.
     """
     if structure is None:
         return Verdict(None, NO_GAINS)
     if not case.drills:
         return Verdict(None, f"{LEFT_OUT}: no nonlinear model of this plant is known")
     try:
-        controller = Controller(structure, K1, K2)
+        controller = Controller(structure, K1, K2, **(surroundings or {}))
         simulated = structure_of(case)
         controller.gains(simulated.input_names, simulated.output_names)
     except InputError as error:
@@ -92,7 +101,9 @@ def try_gains(
     return judge(trials, stable)
 
 
-def judge(trials: Sequence[Trial], stable: bool) -> Verdict:
+def judge(
+    trials: Sequence[Trial], stable: bool, growth: tuple[float, float] | None = None
+) -> Verdict:
     """Say whether gains can be recommended.
 
     They are refused where from any start they do worse than no control, and where they
@@ -104,29 +115,56 @@ def judge(trials: Sequence[Trial], stable: bool) -> Verdict:
         At least one.
     stable : bool
         Whether the linear loop is.
+    growth : pair of float, optional
+        Largest growth rates of the torsional modes on the drilling motion, with the gains and
+        without; that swings die out sooner is a good that the end of a run does not show.
     """
     runs = tuple(trials)
     for trial in runs:
         if (harm := _harm(trial)) is not None:
-            return Verdict(False, harm, runs)
+            return Verdict(False, harm, runs, True)
     good = next((text for trial in runs if (text := _good(trial)) is not None), None)
     settled = [trial for trial in runs if trial.controlled.outcome == Outcome.SETTLES]
+    quiet = all(trial.controlled.outcome in _QUIET for trial in runs)
+    if not settled and good is None and quiet and growth is not None and _decays(*growth):
+        return Verdict(True, _sooner(*growth), runs)
     if not settled and good is None:
         what = "they do not settle it" if stable else "they do not stabilise smooth drilling"
         return Verdict(False, f"{what}, and do no measurable good: {_beside(runs[0])}", runs)
     if len(settled) == len(runs):
         return Verdict(True, "with these gains the motion settles from every start", runs)
     if not settled:
-        return Verdict(True, f"smooth drilling is not reached, but {good}", runs)
+        return Verdict(True, f"smooth drilling is not reached, but {good}{_but(runs)}", runs)
     rest = next(trial for trial in runs if trial not in settled)
-    small = f"the motion settles from {_STARTS[settled[0].start]}, but not from every start"
+    small = f"the motion settles from {settled[0].start.text}, but not from every start"
     return Verdict(True, f"{small}: {_beside(rest)}", runs)
+
+
+def _but(runs: Sequence[Trial]) -> str:
+    """Say what the worst start leads to, where that is far from what the best does."""
+    swings = [trial.controlled.swing for trial in runs]
+    known = [np.inf if swing is None else swing for swing in swings]
+    worst = int(np.argmax(known))
+    return f"; {_beside(runs[worst])}" if known[worst] > min(known) + _APART else ""
+
+
+def _decays(mine: float, free: float) -> bool:
+    """Whether swings die out clearly sooner than without control, or die out at all."""
+    return mine < 0.0 and mine < free - _RATE
+
+
+def _sooner(mine: float, free: float) -> str:
+    instead = f"{-free:.2g}" if free < 0.0 else "not at all"
+    return (
+        "they do no harm from any start, and torsional swings decay at a rate of "
+        f"{-mine:.2g} instead of {instead}"
+    )
 
 
 def _beside(trial: Trial) -> str:
     """Say what a start led to, with the gains and without."""
     mine, free = trial.controlled, trial.uncontrolled
-    text = f"after {_STARTS[trial.start]} {_what(mine)}"
+    text = f"after {trial.start.text} {_what(mine)}"
     return text if free is None else f"{text}; without control {_what(free)}"
 
 
@@ -140,23 +178,25 @@ def _what(found: Figures) -> str:
 def _harm(trial: Trial) -> str | None:
     """Say in what the controlled run is worse, if it is."""
     mine, free = trial.controlled, trial.uncontrolled
-    ends = _SEVERITY.get(mine.outcome, 0)
+    ends = SEVERITY.get(mine.outcome, 0)
     if mine.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES):
         return _beside(trial)
     if free is None:
         # Left out where the motion settles: nothing can be better without control.
         return None
-    if ends > _SEVERITY.get(free.outcome, 0):
+    if ends > SEVERITY.get(free.outcome, 0):
         return _beside(trial)
     if mine.outcome == Outcome.UNDECIDED and free.outcome != Outcome.UNDECIDED:
         return _beside(trial)
-    after = f"after {_STARTS[trial.start]}"
+    after = f"after {trial.start.text}"
     if _more(mine.swing, free.swing, _SWING):
         return f"{after} the bit swings more than without control: {_swing(mine, free)}"
     if _more(mine.stick_fraction, free.stick_fraction, _STUCK):
         shares = _percent(mine.stick_fraction, free.stick_fraction)
         return f"{after} the bit sticks for {shares} of the time"
-    if _more(free.feed, mine.feed, _FEED):
+    # A bit that catches up advances at more than the feed for a while.
+    kept_up = None if free.feed is None else min(free.feed, 1.0)
+    if _more(kept_up, mine.feed, _FEED):
         return f"{after} the bit advances at {_percent(mine.feed, free.feed)} of the feed"
     return None
 
@@ -166,10 +206,11 @@ def _good(trial: Trial) -> str | None:
     mine, free = trial.controlled, trial.uncontrolled
     if free is None or Outcome.UNDECIDED in (mine.outcome, free.outcome):
         return None
-    after = f"after {_STARTS[trial.start]}"
-    if _SEVERITY.get(mine.outcome, 0) < _SEVERITY.get(free.outcome, 0):
+    after = f"after {trial.start.text}"
+    if SEVERITY.get(mine.outcome, 0) < SEVERITY.get(free.outcome, 0):
         return _beside(trial)
-    if _more(free.swing, mine.swing, _SWING):
+    slips = mine.outcome == Outcome.STICK_SLIP and not _more(free.swing, mine.swing, _HALF)
+    if _more(free.swing, mine.swing, _SWING) and not slips:
         return f"{after} the bit swings less than without control: {_swing(mine, free)}"
     if _more(free.stick_fraction, mine.stick_fraction, _STUCK):
         shares = _percent(mine.stick_fraction, free.stick_fraction)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from drillctrl.base import units
+from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.loop_analysis import LoopAnalysis
 from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.designs.worst_case import WorstCase
@@ -17,6 +18,8 @@ from drillctrl.synthesis.objectives import HInfinity, Robust, SemiDiscrete
 
 Lines = list[tuple[str, str]]
 
+# Share of a growth rate from which on its error is shown.
+_SHOWN = 0.05
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
 _VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
 
@@ -38,6 +41,8 @@ def result_lines(result: AnalysisValues) -> Lines:
 def design_lines(design: DesignValues) -> Lines:
     """Return what is known of gains that were designed."""
     word = "stabilised: α = " if design.stable else "not stabilised: best α = "
+    if design.on_motion is not None:
+        word = f"smooth drilling is {'stable' if design.stable else 'unstable'}: α = "
     best = design.optimality
     text = f"{best.method}, residual {best.stationarity:.1g}"
     if best.active_bounds:
@@ -47,6 +52,7 @@ def design_lines(design: DesignValues) -> Lines:
         hits += f", next best {best.next_best:.4f}"
     return [
         *_opening(design),
+        *_motion_lines(design),
         *_loop_lines(design, word, _objective_lines(design)),
         ("Optimal by", text),
         ("", hits),
@@ -66,7 +72,7 @@ def _trial_lines(result: AnalysisValues) -> Lines:
         lines.append(("", "no gains are offered for this point; those below are refused"))
     for trial in result.trials:
         free = trial.uncontrolled
-        text = f"{trial.start}: {_figures_text(trial.controlled)}"
+        text = f"{trial.start.name}: {_figures_text(trial.controlled)}"
         text += f", |u| ≤ {_input_text(result, trial.controlled.max_abs_u)}"
         if free is not None:
             text += f"; without control: {_figures_text(free)}"
@@ -204,6 +210,34 @@ def _loop_lines(result: AnalysisValues, word: str, aims: Lines) -> Lines:
     return lines
 
 
+def _motion_lines(design: DesignValues) -> Lines:
+    """Say what the gains do on the motion that is drilled with."""
+    found = design.on_motion
+    if found is None:
+        return []
+    unit, per = 1.0, "unit of time"
+    if design.rig_point is not None:
+        unit, per = design.rig_point.rig.time_scale, "s"
+    lines: Lines = [("Designed on", "the motion that is drilled with, torsional swings about it")]
+    if found.why != ASKED:
+        lines.append(("", f"because {found.why}"))
+    if found.swings:
+        lines.append(("", f"growth rates per {per}, without control → with it:"))
+    for each in found.swings:
+        swing = each.swing
+        text = f"mode {swing.mode}, swing {swing.amplitude:.2f}: {swing.growth / unit:.3g}"
+        if swing.growth_error > _SHOWN * abs(swing.growth):
+            text += f" ± {swing.growth_error / unit:.1g}"
+        text += f" → {each.growth / unit:.3g}"
+        lines.append(("", text + ("" if each.in_band else " (outside the band of H)")))
+    if found.unknown:
+        swings = ", ".join(dict.fromkeys(f"{swing.amplitude:.2f}" for swing in found.unknown))
+        lines.append(("", f"too irregular to tell at swing {swings}: there runs alone decide"))
+    share = f"1/{1.0 / found.share:.0f} of the bounds" if found.share < 1.0 else "all of the bounds"
+    lines.append(("", f"within {share}, as trial runs chose"))
+    return lines
+
+
 def _objective_lines(design: DesignValues) -> Lines:
     """Say what was minimised and required, where that is not the spectral abscissa alone."""
     lines: Lines = []
@@ -215,6 +249,8 @@ def _objective_lines(design: DesignValues) -> Lines:
             goal = f"largest α of {len(case.around(design.point))} points"
         case Robust(epsilon=epsilon):
             goal = f"largest Re s with relative errors of the plant up to {epsilon:g}"
+        case Drilling():
+            goal = "largest growth rate of torsional swings on that motion"
         case HInfinity(inputs=inputs, outputs=outputs):
             ends = (", ".join(names) or "all" for names in (inputs, outputs))
             goal = "H∞ norm from {} to {}".format(*ends)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drillctrl.base.errors import checked_number
@@ -37,16 +38,19 @@ class WorstCase(WorstLoop):
     def around(self, point: OperatingPoint) -> tuple[OperatingPoint, ...]:
         """Return all points looked at, the given one first."""
         sizes = {name: getattr(self, name) for name in ("psi", "delta0", "omega0")}
-        moved = {name: size for name, size in sizes.items() if size > 0.0}
-        corners = itertools.product(_SAMPLED, repeat=len(moved))
-        box = [
-            point.with_changes(
-                **{
-                    name: (1.0 + sign * size) * getattr(point, name)
-                    for sign, (name, size) in zip(signs, moved.items(), strict=True)
-                }
-            )
-            for signs in corners
-            if any(signs)
-        ]
-        return (point, *box, *self.points)
+        return (point, *box(point, sizes), *self.points)
+
+
+def box(point: OperatingPoint, sizes: Mapping[str, float]) -> list[OperatingPoint]:
+    """Return corners, middles of edges and of faces of a box of relative sizes about a point."""
+    moved = {name: size for name, size in sizes.items() if size > 0.0}
+    return [
+        point.with_changes(
+            **{
+                name: (1.0 + sign * size) * getattr(point, name)
+                for sign, (name, size) in zip(signs, moved.items(), strict=True)
+            }
+        )
+        for signs in itertools.product(_SAMPLED, repeat=len(moved))
+        if any(signs)
+    ]

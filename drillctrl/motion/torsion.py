@@ -61,6 +61,37 @@ class TorsionalMode:
         return root
 
 
+def torsional_states(where: Where) -> tuple[FloatArray, FloatArray, list[int]]:
+    """Return the torsional motion of string and drive, nothing at the bit.
+
+    Returns
+    -------
+    matrix : array, (k, k)
+        Of the torsional states, θ and θ' of the bit first.
+    load : array, (k,)
+        What a torque on the bit does to them.
+    places : list of int
+        Those states among all of the plant.
+
+    Raises
+    ------
+    InputError
+        If there is no plant, axial motion enters torsion elsewhere than at the bit, or a
+        signal arrives late.
+    """
+    case = as_case(where)
+    plant, _ = case.physics("a torsional mode")
+    arrays = case.motion()
+    if arrays.late:
+        raise InputError("plant", f"a signal that arrives {arrays.late[0][0]:g} late", "without")
+    states = plant.linear.states
+    places = [i for i, state in enumerate(states) if state.quantity in _ANGLES]
+    others = [i for i in range(len(states)) if i not in places]
+    if arrays.A[np.ix_(places, others)].any() or arrays.E[places, 0].any():
+        raise InputError("string", "coupled between x and theta", "uncoupled but for the bit")
+    return arrays.A[np.ix_(places, places)], arrays.E[places, 1], places
+
+
 def torsional_modes(where: Where, count: int = 1) -> tuple[TorsionalMode, ...]:
     """Return the slowest torsional modes of string and drive, nothing at the bit.
 
@@ -78,17 +109,7 @@ def torsional_modes(where: Where, count: int = 1) -> tuple[TorsionalMode, ...]:
         than at the bit, or a signal arrives late.
     """
     count = checked_integer("modes", count, 1, 100)
-    case = as_case(where)
-    plant, _ = case.physics("a torsional mode")
-    arrays = case.motion()
-    if arrays.late:
-        raise InputError("plant", f"a signal that arrives {arrays.late[0][0]:g} late", "without")
-    states = plant.linear.states
-    places = [i for i, state in enumerate(states) if state.quantity in _ANGLES]
-    others = [i for i in range(len(states)) if i not in places]
-    if arrays.A[np.ix_(places, others)].any() or arrays.E[places, 0].any():
-        raise InputError("string", "coupled between x and theta", "uncoupled but for the bit")
-    matrix, load = arrays.A[np.ix_(places, places)], arrays.E[places, 1]
+    matrix, load, _ = torsional_states(where)
     roots, right = np.linalg.eig(matrix)
     left = np.linalg.inv(right)
     swings = np.flatnonzero((roots.imag > 0.0) & (-roots.real < _OSCILLATES * np.abs(roots)))
@@ -124,7 +145,7 @@ def forced_speed(
     InputError
         If the string does not decay with that H.
     """
-    closed = _answering(mode, value)
+    closed = answering(mode.matrix, mode.load, value, mode.root.imag)
     if not np.linalg.eigvals(closed).real.max() < 0.0:
         raise InputError("response", value, "one with which the string decays")
     size = mode.load.size
@@ -153,7 +174,7 @@ def ripple_of(
     """
     speed = forced_speed(mode, value, torque, spacing)
     late = speed[speed.size // 2 :]
-    roots = np.linalg.eigvals(_answering(mode, value))
+    roots = np.linalg.eigvals(answering(mode.matrix, mode.load, value, mode.root.imag))
     free = np.exp(np.outer(spacing * np.arange(late.size), roots[roots.imag >= 0.0]))
     columns = np.hstack([free.real, free.imag])
     # Ends weigh nothing, so that what is forced is not taken for what is left.
@@ -162,9 +183,9 @@ def ripple_of(
     return np.asarray(late - columns @ left)
 
 
-def _answering(mode: TorsionalMode, value: complex) -> FloatArray:
-    """Return the string's matrix with H as a damper and a spring at the bit."""
-    closed = mode.matrix.copy()
-    closed[:, 1] += value.real * mode.load
-    closed[:, 0] -= value.imag * mode.root.imag * mode.load
+def answering(matrix: FloatArray, load: FloatArray, value: complex, frequency: float) -> FloatArray:
+    """Return a string's matrix with H as a damper and a spring at the bit; see `TorsionalMode`."""
+    closed = matrix.copy()
+    closed[:, 1] += value.real * load
+    closed[:, 0] -= value.imag * frequency * load
     return closed

@@ -59,6 +59,7 @@ def solve(
     requirements: Requirements,
     others: Sequence[LoopFamily] = (),
     seed: int = 0,
+    cost: descent.Objective | None = None,
 ) -> Solution:
     """Find the gains of a design.
 
@@ -74,14 +75,18 @@ def solve(
         Further loops of a `WorstLoop`.
     seed : int
         Of the starting points.
+    cost : callable, optional
+        Value and gradient of what is added to the objective.
     """
     search = global_search(family, seed)
-    plain = isinstance(objective, Exact)
+    plain = isinstance(objective, Exact) and cost is None
     # What the unconstrained optimum meets is no constraint.
     if plain and meets(family, search.best.gains, requirements):
         gains = hold_multiple_root(family, search.best)
         return Solution(gains, certify_optimality(family, gains, search), search.evaluations)
     goal, excesses = _goal(family, objective, others), _excesses(family, requirements)
+    if cost is not None:
+        goal = _sum(goal, cost)
     candidates = [basin.gains for basin in search.basins[:_CANDIDATES]]
     found = constrained_search(family, goal, excesses, candidates, seed)
     certificate = certify_sampled(family, goal, excesses, found, seed)
@@ -136,6 +141,14 @@ def _goal(
     if isinstance(objective, HInfinity):
         return _negative(measures.inverse_norm(family, objective.inputs, objective.outputs))
     return family.abscissa
+
+
+def _sum(measure: descent.Objective, other: descent.Objective) -> descent.Objective:
+    def both(gains: FloatArray) -> tuple[float, FloatArray]:
+        (a, slope_a), (b, slope_b) = measure(gains), other(gains)
+        return a + b, slope_a + slope_b
+
+    return both
 
 
 def _negative(measure: descent.Objective) -> descent.Objective:

@@ -11,6 +11,7 @@ import pytest
 
 from drillctrl import (
     Controller,
+    Exact,
     OperatingPoint,
     RigPoint,
     analyze,
@@ -40,7 +41,7 @@ def at(rpm, rop):
 @pytest.fixture(scope="module")
 def refused():
     """120 rpm, 20 m/h, case2: the gains of least α turn the bit backwards."""
-    return design(at(120, 20), "case2")
+    return design(at(120, 20), "case2", objective=Exact())
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_swing_without_control(rpm, rop, free):
 )
 def test_swing_with_plain_damping(rpm, rop, swing, digits):
     tried = analyze(at(rpm, rop), "pd", [0.0, -0.5], [0.0, 0.0], trials=True)
-    assert tried.trials[0].start == "small"
+    assert tried.trials[0].start.name == "small"
     assert tried.trials[0].controlled.swing == pytest.approx(swing, abs=digits)
 
 
@@ -97,7 +98,7 @@ def test_harmful_gains_are_refused_first(refused):
     ],
 )
 def test_gains_of_least_abscissa_refused(rpm, rop, structure, ends):
-    result = design(at(rpm, rop), structure)
+    result = design(at(rpm, rop), structure, objective=Exact())
     assert result.trials[0].controlled.outcome == ends
     assert result.recommended is False
 
@@ -182,7 +183,7 @@ def run(capsys):
 
 def test_exit_codes(run):
     rig = ("--rig", "table1", "--rop", "20 m/h", "--speed", "120 rpm", "--structure", "case2")
-    status, out = run("design", *rig, "--require-stable")
+    status, out = run("design", *rig, "--require-stable", "--objective", "exact")
     assert status == 3
     assert out.startswith("REFUSED")
     assert run("analyze", "--structure", "p", "--K1", "-1.5", "--require-stable")[0] == 0
@@ -227,14 +228,14 @@ BROKEN, TURNS, GROWS = (
     ],
 )  # fmt: skip
 def test_judgement(mine, free, stable, recommended, words):
-    verdict = judge([Trial("small", mine, free)], stable)
+    verdict = judge([Trial(STARTS[0], mine, free)], stable)
     assert verdict.recommended is recommended
     assert words in verdict.reason
 
 
 def test_small_basin_is_said():
     lost = Figures(Outcome.STICK_SLIP, 1.0, 0.1, 1.0, 1.0)
-    verdict = judge([Trial("small", FINE, lost), Trial("kick", lost, lost)], True)
+    verdict = judge([Trial(STARTS[0], FINE, lost), Trial(STARTS[1], lost, lost)], True)
     assert verdict.recommended is True
     assert "not from every start" in verdict.reason
 

@@ -1,0 +1,127 @@
+"""Designs on the motion that is drilled with: measure it, find gains, let runs choose."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from drillctrl.base.errors import InputError
+from drillctrl.base.workers import open_executor
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.authority import Candidate, between, candidates, irregular, tried
+from drillctrl.designs.drilling import (
+    ASKED,
+    Drilling,
+    OnMotion,
+    followed_swings,
+    largest_growth,
+    measured_swings,
+)
+from drillctrl.designs.result import Analysis, Design, analysis_fields, assess
+from drillctrl.drilling.case import Case
+from drillctrl.motion.loop import torsional_system
+from drillctrl.simulation.controller import Controller
+from drillctrl.synthesis.objectives import Requirements
+
+
+def fits_motion(case: Case, structure: FeedbackStructure) -> bool:
+    """Whether a structure closes a torsional loop about the axial orbit of a case."""
+    if case.point is None or not case.point.delta0 > 0.0:
+        return False
+    try:
+        system = torsional_system(case, 0j, 1.0, structure.inputs)
+    except InputError:
+        return False
+    return set(structure.outputs) <= set(system.output_names)
+
+
+def motion_design(
+    case: Case,
+    structure: FeedbackStructure,
+    objective: Drilling,
+    requirements: Requirements,
+    *,
+    seed: int,
+    trials: bool,
+    surroundings: Mapping[str, Any],
+    workers: int,
+    why: str = ASKED,
+) -> Design:
+    """Return the gains with which torsional swings decay soonest, as far as runs bear it out.
+
+    Parameters
+    ----------
+    case : Case
+        What drills, and where.
+    structure : FeedbackStructure
+        With its bounds.
+    objective : Drilling
+        Which swings and points.
+    requirements : Requirements
+        Of the torsional loop.
+    seed : int
+        Of the starting points.
+    trials : bool
+        Whether runs choose how much of the bounds is used; else it is the most that keeps the
+        modes where the bit's answer is known.
+    surroundings : mapping
+        Limits, clock and delays of the controller in the runs.
+    workers : int
+        Processes.
+    why : str
+        Why the gains are designed for the motion.
+
+    Raises
+    ------
+    InputError
+        If there is no plant, nothing is cut, or the structure is not torsional alone.
+    """
+    began = time.perf_counter()
+    case.physics(f"objective {objective.name}")
+    Controller(structure, *structure.gains(structure.lower), **surroundings)
+    with open_executor(workers, None) as executor:
+        swings = measured_swings(case, objective, executor)
+        without = largest_growth(swings)
+        found = candidates(case, objective, swings, structure, requirements, seed)
+        if trials:
+            found = tried(case, objective, structure, found, without, surroundings, executor)
+            if irregular(found):
+                more = candidates(
+                    case, objective, swings, structure, requirements, seed, between(found)
+                )
+                found = sorted([*found, *more], key=lambda each: -each.share)
+                found = tried(case, objective, structure, found, without, surroundings, executor)
+    best: Candidate = found[0]
+    gains = best.solution.gains
+    known = analysis_fields(assess(case, structure, *structure.gains(gains)))
+    if best.verdict is not None:
+        known["verdict"] = best.verdict
+    made = followed_swings(case, objective, swings, structure, gains)
+    growth = max((each.growth for each in made), default=best.growth)
+    known["elapsed_seconds"] = time.perf_counter() - began
+    return Design(
+        **known,
+        objective=objective,
+        objective_value=growth,
+        requirements=requirements,
+        requirements_met=best.met,
+        optimality=best.solution.optimality,
+        evaluations=sum(each.solution.evaluations for each in found),
+        on_motion=OnMotion(
+            why,
+            best.share,
+            growth,
+            without,
+            made,
+            tuple(swing for swing in swings if not swing.known),
+        ),
+    )
+
+
+def why_not_smooth(exact: Analysis) -> str:
+    """Say why smooth drilling is not what is designed for."""
+    return (
+        "no gains were found with which smooth drilling is stable "
+        f"(best α = {exact.spectral_abscissa:.4g})"
+    )

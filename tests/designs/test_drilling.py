@@ -1,0 +1,224 @@
+"""Designs on the motion that is drilled with, beside runs and roots by other routes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drillctrl import (
+    Controller,
+    Drilling,
+    Exact,
+    InputError,
+    RigPoint,
+    as_case,
+    cli,
+    design,
+    feed,
+    preset_structure,
+    simulate,
+    spectral_abscissa,
+    table1,
+    torsional_system,
+)
+from drillctrl.designs.authority import Candidate, irregular
+from drillctrl.designs.drilling import Swing, controlled_swings, cost_of_gains, swing_families
+from drillctrl.designs.trials import STARTS, Trial
+from drillctrl.designs.verdict import Verdict, judge
+from drillctrl.simulation.outcome import Figures
+from drillctrl.simulation.status import Outcome
+
+QUICK = Drilling(kick=0.1)
+
+
+def at(rpm, rop):
+    """Return a point of Table 1's rig, rpm and m/h."""
+    return RigPoint(table1(), rpm * math.pi / 30.0, rop / 3600.0)
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    """120 rpm, 50 m/h, where a kick leads to a swing of 0.40 without control."""
+    limit = 0.94e3 / table1().torsional_stiffness
+    return design(at(120, 50), "pd", objective=QUICK, surroundings={"limit": limit})
+
+
+@given(
+    st.complex_numbers(max_magnitude=0.5),
+    st.floats(0.5, 2.0),
+    st.floats(-1.0, 0.5),
+    st.floats(-1.0, 0.0),
+)
+@settings(max_examples=30, deadline=None)
+def test_the_torsional_loop_of_one_degree_of_freedom(value, frequency, spring, damper):
+    case = as_case(at(120, 20))
+    system = torsional_system(case, value, frequency)
+    structure = preset_structure("pd")
+    swing = Swing(0, 1, 0.1, frequency, value, 0.0, 0.0, 0.0)
+    (made,) = controlled_swings(case, QUICK, [swing], structure, np.array([spring, damper]))
+    damping = 2.0 * case.point.kappa + value.real
+    stiffness = 1.0 - frequency * value.imag
+    roots = np.roots([1.0, damping - damper, stiffness - spring])
+    assert made.growth == pytest.approx(roots.real.max(), abs=1e-8)
+    free = np.roots([1.0, damping, stiffness])
+    assert spectral_abscissa(system) == pytest.approx(free.real.max(), abs=1e-8)
+
+
+def test_gains_that_move_the_frequency_cost():
+    case = as_case(at(120, 20))
+    structure = preset_structure("case2")
+    families = swing_families(
+        case, QUICK, [Swing(0, 1, 0.1, 1.0, -0.05 + 0j, 0.0, 0.0, 0.0)], structure
+    )
+    cost = cost_of_gains(families, 1.0)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        gains = 1e-4 * rng.standard_normal(4)
+        value, slope = cost(gains)
+        ahead = [cost(gains + 1e-7 * e)[0] for e in np.eye(4)]
+        np.testing.assert_allclose(slope, (np.array(ahead) - value) / 1e-7, rtol=1e-3, atol=1e-7)
+        roots = np.linalg.eigvals(families[0].system.A0)
+        root = roots[np.argmax(roots.imag)]
+        # Newton on the characteristic equation of the loop, from the root without gains.
+        s, tau, k = root, case.point.delay, gains
+        (a, b), own = (k[0] + k[2] * np.exp(-s * tau), k[1] + k[3] * np.exp(-s * tau)), 0.0
+        own = s * s + (2.0 * case.point.kappa - 0.05) * s + 1.0 - (a + b * s)
+        shift = -own / (2.0 * s + 2.0 * case.point.kappa - 0.05)
+        size = 0.01 * 10.0 / 4.0 * float(np.sum((gains / structure.upper) ** 2))
+        assert value - size == pytest.approx(shift.imag**2, rel=1e-3, abs=1e-14)
+
+
+def rate_of(run, frequency):
+    """Return the growth rate of the bit's swing at a frequency, from windows of four periods."""
+    window = 8.0 * math.pi / frequency
+    count = int(run.times[-1] // window)
+    logs = []
+    for k in range(1, count):
+        times = np.linspace(k * window, (k + 1) * window, 2001)
+        speed = run.at(times, ("dtheta",)).dtheta
+        weight = 1.0 - np.cos(2.0 * math.pi * (times - times[0]) / window)
+        logs.append(math.log(abs(np.mean(weight * speed * np.exp(-1j * frequency * times)))))
+    return np.polyfit(window * np.arange(1, count), logs, 1)[0]
+
+
+@pytest.mark.parametrize(("rpm", "rop", "damper"), [(120, 10, 0.1), (140, 40, -0.02)])
+def test_growth_with_control_is_that_of_the_simulator(rpm, rop, damper):
+    case = as_case(at(rpm, rop))
+    found = design(case, "pd", objective=QUICK, trials=False)
+    swings = [each.swing for each in found.on_motion.swings][-1:]
+    structure = preset_structure("pd")
+    gains = np.array([0.0, damper])
+    (made,) = controlled_swings(case, QUICK, swings, structure, gains)
+    speed = 0.1 * case.point.omega0
+    controller = Controller(structure, *structure.gains(gains))
+    run = simulate(
+        case,
+        controller,
+        duration=100.0,
+        initial={"dx": 0.1 * case.point.penetration_rate, "dtheta": speed},
+    )
+    measured = rate_of(run, made.frequency)
+    assert made.growth == pytest.approx(measured, rel=0.25, abs=0.005)
+    assert made.growth * measured > 0.0
+
+
+def test_a_design_on_the_motion_holds_from_other_starts(quiet):
+    assert quiet.recommended is True
+    assert quiet.on_motion.growth < -0.1
+    assert all(each.in_band for each in quiet.on_motion.swings)
+    assert len(quiet.trials) > len(STARTS)
+    point = quiet.point
+    controller = quiet.controller(limit=1.0)
+    for feed_kick, speed_kick in ((0.3, 0.6), (-0.5, -0.4), (0.8, 0.3)):
+        initial = {
+            "dx": feed_kick * point.penetration_rate,
+            "dtheta": speed_kick * point.omega0,
+        }
+        run = simulate(quiet.case, controller, duration=200.0, initial=initial)
+        tail = point.omega0 + run.at(np.linspace(150.0, 200.0, 20001), ("dtheta",)).dtheta
+        # Without control it swings by 0.40 after a kick, by 0.08 from a quiet start.
+        assert np.ptp(tail) / (2.0 * tail.mean()) < 0.08
+
+
+def test_what_is_told(quiet):
+    text = quiet.summary()
+    assert "the motion that is drilled with" in text
+    assert "smooth drilling is unstable" in text
+    assert "mode 1, swing 0.03" in text
+    fields = json.loads(json.dumps(quiet.to_dict(), allow_nan=False))
+    assert fields["objective"]["name"] == "drilling"
+    assert fields["on_motion"]["growth_rate"] == quiet.on_motion.growth
+    assert len(fields["on_motion"]["swings"]) == 2
+
+
+def test_without_an_objective_the_motion_is_designed_for_where_smooth_drilling_stays_unstable():
+    found = design(at(120, 20), "pd", bounds={"K1_1": (-1, 1), "K1_2": (-1, 1)})
+    assert isinstance(found.objective, Drilling)
+    assert "no gains were found with which smooth drilling is stable" in found.on_motion.why
+    assert found.recommended is True
+    assert "torsional swings decay at a rate" in found.reason
+    smooth = design(at(150, 20), "pd", trials=False)
+    assert isinstance(smooth.objective, Exact)
+    assert smooth.on_motion is None
+
+
+def test_nothing_is_recommended_where_nothing_helps(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main([
+            "design", "--rig", "table1", "--speed", "60 rpm", "--rop", "20 m/h", "--structure", "pd",
+            "--objective", "drilling", "--kick", "0.05", "--limit", "0.9 kN*m", "--require-stable",
+            "--json",
+        ])  # fmt: skip
+    fields = json.loads(capsys.readouterr().out)
+    assert stop.value.code == 3
+    assert fields["recommended"] is False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--objective", "drilling", "--kick", "2"], "kick"),
+        (["--objective", "drilling", "--epsilon", "0.1"], "--epsilon"),
+        (["--objective", "drilling", "--delta0", "0"], "delta0"),
+        (["--kick", "0.2"], "--kick"),
+        (["--limit", "-1"], "limit"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["design", *arguments])
+    told = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert words in told
+    assert len(told.strip().splitlines()) == 1
+
+
+def test_axial_feedback_has_no_torsional_loop():
+    with pytest.raises(InputError, match="feed"):
+        design(at(120, 20), feed(), objective=QUICK)
+
+
+def figures(swing, outcome=Outcome.ORBIT):
+    return Figures(outcome, swing, 0.0, 1.0, 1.0)
+
+
+def test_swings_that_decay_sooner_are_a_good_of_quiet_motions_only():
+    alike = [Trial(STARTS[0], figures(0.015), figures(0.015))]
+    assert judge(alike, False).recommended is False
+    assert judge(alike, False, (-0.3, -0.02)).recommended is True
+    assert judge(alike, False, (0.1, 0.2)).recommended is False
+    stick = figures(1.0, Outcome.STICK_SLIP)
+    assert judge([Trial(STARTS[0], stick, stick)], False, (-0.3, 0.1)).recommended is False
+
+
+def test_candidates_that_runs_tell_apart():
+    def candidate(*swings):
+        trials = tuple(Trial(STARTS[0], figures(swing), figures(0.5)) for swing in swings)
+        return Candidate(1.0, None, -0.1, True, (), Verdict(True, "", trials))
+
+    assert irregular([candidate(0.25, 0.6)])
+    assert irregular([candidate(0.5), candidate(0.25)])
+    assert not irregular([candidate(0.25, 0.26), candidate(0.9)])
