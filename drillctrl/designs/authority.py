@@ -31,7 +31,6 @@ from drillctrl.synthesis import problem
 from drillctrl.synthesis.objectives import Requirements, WorstLoop
 from drillctrl.synthesis.problem import Solution
 
-SHARES = tuple(2.0**-k for k in range(8))
 # Largest swings of two candidates that are alike, and that are far apart.
 _ALIKE, _APART = 0.02, 0.1
 # Gains that differ by less than this share of their bounds are the same.
@@ -97,7 +96,7 @@ def candidates(
     structure: FeedbackStructure,
     requirements: Requirements,
     seed: int,
-    shares: Sequence[float] = SHARES,
+    shares: Sequence[float],
 ) -> list[Candidate]:
     """Return the gains of slowest decay made fastest within falling shares of the bounds.
 
@@ -143,7 +142,7 @@ def irregular(order: Sequence[Candidate]) -> bool:
     return order[0].harmful or order[0].score[2] > smallest + _APART
 
 
-def between(found: Sequence[Candidate], shares: Sequence[float] = SHARES) -> list[float]:
+def between(found: Sequence[Candidate], shares: Sequence[float]) -> list[float]:
     """Return the shares that lie between those of the candidates."""
     first = max(each.share for each in found)
     return [share / np.sqrt(2.0) for share in shares if share <= first]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.base.text import finite_or_none
 from drillctrl.base.workers import spread_out
 from drillctrl.delay.structure import FeedbackStructure
@@ -274,22 +274,12 @@ def swing_families(
     """Return the loops whose slowest decay is to be made fastest.
 
     Where no answer is known, they are of the string alone.
-
-    Raises
-    ------
-    InputError
-        If the structure feeds back or drives what is not torsion.
     """
     cases = cases_around(case, objective)
     known = [swing for swing in swings if swing.known]
     systems = [s for w in known for s in swing_systems(cases[w.point], w, structure.inputs)]
     if not systems:
         systems = [torsional_system(there, 0j, 1.0, structure.inputs) for there in cases]
-    for name in structure.outputs:
-        if name not in systems[0].output_names:
-            seen = ", ".join(systems[0].output_names)
-            wanted = f"one that feeds back {seen} alone with objective {objective.name}"
-            raise InputError("structure", structure.name, wanted)
     return [loop_family(system, structure) for system in systems]
 
 

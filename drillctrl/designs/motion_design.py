@@ -9,6 +9,7 @@ from typing import Any
 from drillctrl.base.errors import InputError
 from drillctrl.base.workers import open_executor
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.authority import Candidate, between, candidates, irregular, tried
 from drillctrl.designs.drilling import (
     ASKED,
@@ -24,16 +25,24 @@ from drillctrl.motion.loop import torsional_system
 from drillctrl.simulation.controller import Controller
 from drillctrl.synthesis.objectives import Requirements
 
+# Of the bounds, within which gains are looked for.
+SHARES = tuple(2.0**-k for k in range(8))
+
 
 def fits_motion(case: Case, structure: FeedbackStructure) -> bool:
     """Whether a structure closes a torsional loop about the axial orbit of a case."""
     if case.point is None or not case.point.delta0 > 0.0:
         return False
     try:
-        system = torsional_system(case, 0j, 1.0, structure.inputs)
+        system = torsional_system(case, 0j, 1.0)
     except InputError:
         return False
-    return set(structure.outputs) <= set(system.output_names)
+    return _within(system, structure)
+
+
+def _within(torsion: DelaySystem, structure: FeedbackStructure) -> bool:
+    drives, sees = set(torsion.input_names), set(torsion.output_names)
+    return set(structure.inputs) <= drives and set(structure.outputs) <= sees
 
 
 def motion_design(
@@ -79,16 +88,21 @@ def motion_design(
     """
     began = time.perf_counter()
     case.physics(f"objective {objective.name}")
+    torsion = torsional_system(case, 0j, 1.0)
+    if not _within(torsion, structure):
+        drives, sees = ", ".join(torsion.input_names), ", ".join(torsion.output_names)
+        wanted = f"one that drives {drives} and feeds back {sees} alone, with {objective.name}"
+        raise InputError("structure", structure.name, wanted)
     Controller(structure, *structure.gains(structure.lower), **surroundings)
     with open_executor(workers, None) as executor:
         swings = measured_swings(case, objective, executor)
         without = largest_growth(swings)
-        found = candidates(case, objective, swings, structure, requirements, seed)
+        found = candidates(case, objective, swings, structure, requirements, seed, SHARES)
         if trials:
             found = tried(case, objective, structure, found, without, surroundings, executor)
             if irregular(found):
                 more = candidates(
-                    case, objective, swings, structure, requirements, seed, between(found)
+                    case, objective, swings, structure, requirements, seed, between(found, SHARES)
                 )
                 found = sorted([*found, *more], key=lambda each: -each.share)
                 found = tried(case, objective, structure, found, without, surroundings, executor)
