@@ -10,6 +10,7 @@ from typing import Any
 
 from drillctrl.base import units
 from drillctrl.base.text import finite_or_none
+from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
@@ -60,6 +61,8 @@ class Report:
         Beside a stable design that minimises α and is not refused.
     remedies : tuple of Remedy
         What else stabilises the point, if a design does not.
+    quieter : tuple of Quieter
+        With what the motion is quiet without control, where a design on it is refused.
     """
 
     result: Analysis
@@ -67,6 +70,7 @@ class Report:
     boundary: BoundaryDecision | None
     alternative: Alternative | None
     remedies: tuple[Remedy, ...]
+    quieter: tuple[Quieter, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -80,6 +84,7 @@ class Report:
                 "next_root": finite_or_none(decision.next_root),
             }
             fields["remedies"] = [remedy.to_dict() for remedy in self.remedies]
+            fields["quieter"] = [change.to_dict() for change in self.quieter]
             if other is not None:
                 fields["alternative"] = _alternative_fields(other)
         return fields
@@ -90,6 +95,7 @@ class Report:
         if isinstance(design, Design):
             lines = [*design_lines(design), *_boundary_lines(design, self.boundary)]
             lines += _remedy_lines(design, self.remedies)
+            lines += _quieter_lines(design, self.quieter)
         else:
             lines = result_lines(design)
         if self.robustness is not None:
@@ -134,7 +140,12 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
         other = Alternative(found, robustness_of(found))
     if not result.stable:
         at("what would stabilise")
-    return Report(result, stands, decision, other, remedies(result))
+    helps = remedies(result)
+    quiet: tuple[Quieter, ...] = ()
+    if result.on_motion is not None and result.verdict.refused:
+        at("what would be quiet")
+        quiet = quieter(result.case)
+    return Report(result, stands, decision, other, helps, quiet)
 
 
 def boundary_decision(design: Design) -> BoundaryDecision | None:
@@ -217,6 +228,34 @@ def _remedy_lines(design: Design, found: tuple[Remedy, ...]) -> Lines:
         tried = "richer presets, an axial actuator, this structure and none up to 4 times the speed"
         return [("Would stabilise", f"nothing that was tried ({tried})")]
     return list(zip(["Would stabilise", *[""] * (len(words) - 1)], words, strict=True))
+
+
+def _quieter_lines(design: Design, found: tuple[Quieter, ...]) -> Lines:
+    """Say what would be quiet without control where nothing was found that helps."""
+    if design.on_motion is None or not design.verdict.refused:
+        return []
+    words = []
+    for change in found:
+        text = _change_text(design, change)
+        words.append(f"{text}: swing {change.swing:.2g} at most, from every start")
+    if not words:
+        words = ["nothing up to twice the speed, a tenth of the feed or four more blades"]
+    return list(zip(["Quiet without", *[""] * (len(words) - 1)], words, strict=True))
+
+
+def _change_text(design: Design, change: Quieter) -> str:
+    """Return a change in the units of whoever asked."""
+    point = design.rig_point
+    if change.kind == "blades":
+        return f"{change.value:.0f} blades"
+    if point is None:
+        what = "the speed" if change.kind == "speed" else "the feed"
+        return f"{change.value:.2g} times {what}"
+    if change.kind == "speed":
+        rpm = units.from_si(change.value * point.rotary_speed, units.ROTARY_SPEED, "rpm")
+        return f"{rpm:.4g} rpm at this rate of penetration"
+    rate = units.from_si(change.value * point.penetration_rate, units.SPEED, "m/hour")
+    return f"{rate:.4g} m/h at this speed"
 
 
 def _speed_text(design: Analysis) -> str:

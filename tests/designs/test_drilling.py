@@ -32,7 +32,8 @@ from drillctrl.designs.drilling import (
     measured_swings,
     swing_families,
 )
-from drillctrl.designs.trials import STARTS, Trial
+from drillctrl.designs.quieter import quieter
+from drillctrl.designs.trials import STARTS, Trial, trial_run
 from drillctrl.designs.verdict import Verdict, judge
 from drillctrl.simulation.outcome import Figures
 from drillctrl.simulation.status import Outcome
@@ -50,8 +51,12 @@ def at(rpm, rop):
 @pytest.fixture(scope="module")
 def quiet():
     """120 rpm, 50 m/h, where a kick leads to a swing of 0.40 without control."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr("drillctrl.designs.motion_design.SHARES", (0.25, 0.125))
     limit = 0.94e3 / table1().torsional_stiffness
-    return design(at(120, 50), "pd", objective=QUICK, surroundings={"limit": limit})
+    found = design(at(120, 50), "pd", objective=QUICK, surroundings={"limit": limit})
+    patch.undo()
+    return found
 
 
 @given(
@@ -185,6 +190,20 @@ def test_nothing_is_recommended_where_nothing_helps(capsys, monkeypatch):
     fields = json.loads(capsys.readouterr().out)
     assert stop.value.code == 3
     assert fields["recommended"] is False
+    assert {change["kind"] for change in fields["quieter"]} == {"speed", "feed"}
+    for change in fields["quieter"]:
+        assert change["swing"] <= 0.3
+
+
+def test_a_quieter_motion_is_the_nearest_that_runs_show():
+    found = {change.kind: change for change in quieter(as_case(at(60, 20)))}
+    faster = found["speed"]
+    one_step_less = at(60 * (faster.value - 0.1), 20)
+    swings = [trial_run(as_case(one_step_less), None, start).swing for start in STARTS]
+    assert max(swings) > 0.3
+    for change in found.values():
+        case = as_case(change.where)
+        assert trial_run(case, None, STARTS[2]).swing <= change.swing
 
 
 @pytest.mark.parametrize(
