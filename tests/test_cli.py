@@ -74,7 +74,7 @@ def test_weight_on_bit_instead_of_rate(capsys):
 
 
 def test_require_stable(capsys):
-    base = ["design", "--structure", "p", "--require-stable", "--omega0", 10, "--psi", 14]
+    base = ["design", "--structure", "p", "--require-stable", "--objective", "exact", "--omega0", 10, "--psi", 14]
     status, out, _ = run(capsys, *base, "--delta0", 12)
     assert status == 3
     assert "not stabilised: best α" in out
