@@ -112,7 +112,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         events=len(simulation.events),
         steps=simulation.steps,
         elapsed_seconds=simulation.elapsed_seconds,
-        settling_time=settling_time(simulation),
+        settling_time=_settled_from(simulation, run),
     )
 
 
@@ -131,9 +131,15 @@ def settling_time(simulation: Trace, within: float = SETTLED_WITHIN) -> float | 
     float or None
         None if the run broke off, or either is still beyond in the last tenth of it.
     """
+    return _settled_from(simulation, simulation.on_steps(PER_STEP, names=("x", "theta")), within)
+
+
+def _settled_from(
+    simulation: Trace, motion: Motion, within: float = SETTLED_WITHIN
+) -> float | None:
+    """Return `settling_time` from the whole motion."""
     if simulation.status != Status.DONE or simulation.steps == 0:
         return None
-    motion = simulation.on_steps(PER_STEP, names=("x", "theta"))
     last = 0.0
     for values in (abs(motion.x), abs(motion.theta)):
         beyond = np.flatnonzero(values > within * values.max(initial=0.0))
