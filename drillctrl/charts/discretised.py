@@ -74,9 +74,7 @@ class GainSurface:
         drawn = ax.contourf(
             self.x, self.y, self.radius, levels=levels, cmap="cividis", extend="both"
         )
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        figure.colorbar(drawn, ax=ax, label=f"ρ(D), m = {self.m}, order {self.order}")
+        ax.figure.colorbar(drawn, ax=ax, label=f"ρ(D), m = {self.m}, order {self.order}")
         draw_curves(ax, self.chart.curves, "black", "exact boundary")
         gains = self.optimum.K1.ravel(), self.optimum.K2.ravel()
         vector = self.optimum.structure.vector(*gains) if self.optimum.structure else None
@@ -179,9 +177,7 @@ class RootLocus:
         many = np.repeat(self.values, self.multipliers.shape[1])
         points = self.multipliers.ravel()
         drawn = ax.scatter(points.real, points.imag, c=many, s=6, cmap="cividis")
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        figure.colorbar(drawn, ax=ax, label=axis_text(self.axis))
+        ax.figure.colorbar(drawn, ax=ax, label=axis_text(self.axis))
         ax.set_aspect("equal")
         ax.set_xlabel("Re")
         ax.set_ylabel("Im")

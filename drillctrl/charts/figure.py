@@ -202,9 +202,7 @@ def plot_chart(
         )
         drawn.set_array(np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
+        bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
         bar.set_label("frequency of the crossing root, |Im s|")
     _label_regions(ax, plane, regions)
     label_axes(ax, plane)

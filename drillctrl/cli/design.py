@@ -17,7 +17,7 @@ from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
     NOT_STABILISED,
     check_outputs,
-    deliver,
+    deliver_roots,
     root_output_options,
     trials_option,
     wants_trials,
@@ -85,7 +85,7 @@ def design_command(
         seed=seed,
         trials=wants_trials(trials),
     )
-    deliver(result, prove, as_json, out, plot)
+    deliver_roots(result, prove, as_json, out, plot)
     met = result.stable and result.requirements_met and not result.verdict.refused
     if require_stable and not met:
         raise click.exceptions.Exit(NOT_STABILISED)
