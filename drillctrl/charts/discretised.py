@@ -124,18 +124,13 @@ def gain_surface(
         raise InputError("structure", chosen.name, "one with two gains")
     case = as_case(point)
     plant = case.system(chosen.inputs)
-    x, y = (
-        np.linspace(low, high, number) for low, high in zip(chosen.lower, chosen.upper, strict=True)
-    )
+    x, y = (np.linspace(*ends, number) for ends in chosen.gain_bounds.values())
     radius = np.empty((number, number))
     for i, second in enumerate(y):
         for j, first in enumerate(x):
             loop = close_loop(plant, chosen, *chosen.gains([first, second]))
             radius[i, j] = semidiscretize(loop, m, order).spectral_radius
-    axes = [
-        (name, float(low), float(high))
-        for name, low, high in zip(chosen.gain_names, chosen.lower, chosen.upper, strict=True)
-    ]
+    axes = [(name, *ends) for name, ends in chosen.gain_bounds.items()]
     fixed = chosen.gains(np.zeros(2))
     exact = chart(point, axes[0], axes[1], chosen, *fixed)
     optimum = design(case, chosen, trials=False)
