@@ -324,7 +324,7 @@ def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
 
 
 def test_an_objective_and_a_requirement_on_the_command_line(capsys):
-    point = ["design", "--structure", "case1", "--json"]
+    point = ["design", "--structure", "case1", "--json", "--trials", "none"]
     _, exact, _ = run(capsys, *point)
     _, worst, _ = run(capsys, *point, "--objective", "worst-case", "--psi-error", 0.2)
     _, slow, _ = run(capsys, *point, "--max-input-gain", 1.02)

@@ -12,7 +12,8 @@ from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_tab
 from drillctrl.base.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
-QUICK = ["table", "--omega0", "6:22:3", "--delta0", "1:11:3", "--out"]
+# Trials are no part of a checkpoint.
+QUICK = ["table", "--omega0", "6:22:5", "--delta0", "1:11:4", "--trials", "none", "--out"]
 # Many nodes, the first of them soon done.
 MANY = ["table", "--omega0", "6:22:17", "--delta0", "1:11:9", "--trials", "none", "--out"]
 
