@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import HealthCheck, settings
 
-from drillctrl import OperatingPoint, plant_system
+from drillctrl import OperatingPoint, design, plant_system, report
 
 settings.register_profile(
     "drillctrl",
@@ -25,3 +25,15 @@ def point_c():
 def plant_c(point_c):
     """The open loop at point C."""
     return plant_system(point_c)
+
+
+@pytest.fixture(scope="session")
+def best_c(point_c):
+    """The gains of case1 of least abscissa at point C."""
+    return design(point_c, "case1", trials=False)
+
+
+@pytest.fixture(scope="session")
+def told_c(best_c):
+    """All that is said of them."""
+    return report(best_c)

@@ -74,7 +74,18 @@ def test_weight_on_bit_instead_of_rate(capsys):
 
 
 def test_require_stable(capsys):
-    base = ["design", "--structure", "p", "--require-stable", "--objective", "exact", "--omega0", 10, "--psi", 14]
+    base = [
+        "design",
+        "--structure",
+        "p",
+        "--require-stable",
+        "--objective",
+        "exact",
+        "--omega0",
+        10,
+        "--psi",
+        14,
+    ]
     status, out, _ = run(capsys, *base, "--delta0", 12)
     assert status == 3
     assert "not stabilised: best α" in out
@@ -324,7 +335,7 @@ def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
 
 
 def test_an_objective_and_a_requirement_on_the_command_line(capsys):
-    point = ["design", "--structure", "case1", "--json"]
+    point = ["design", "--structure", "case1", "--json", "--trials", "none"]
     _, exact, _ = run(capsys, *point)
     _, worst, _ = run(capsys, *point, "--objective", "worst-case", "--psi-error", 0.2)
     _, slow, _ = run(capsys, *point, "--max-input-gain", 1.02)

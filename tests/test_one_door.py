@@ -42,12 +42,13 @@ PLACES = {
 }
 STRUCTURE, K1, K2 = preset_structure("case1"), np.array([[-3.8]]), np.array([[3.6]])
 WINDOW = ("omega0", 9.0, 9.5), ("delta0", 2.0, 2.2)
+COARSE = {"first_lines": 3, "samples": 4, "tolerance": 0.1}
 # The verb, and whether a system alone is enough.
 VERBS = {
     "design": (lambda w: design(w, "p", trials=False), True),
     "analyze": (analyze, True),
     "chart": (lambda w: chart(w, ("K1_1", -5, 5), ("K2_1", -5, 5), STRUCTURE, K1, K2), True),
-    "stabilisable": (lambda w: stabilisable_chart(w, *WINDOW, "p"), False),
+    "stabilisable": (lambda w: stabilisable_chart(w, *WINDOW, "p", **COARSE), False),
     "volume": (lambda w: stability_volume(w, *WINDOW, ("psi", 13.0, 14.0), slices=3), False),
     "gain surface": (lambda w: gain_surface(w, count=5), True),
     "root locus": (lambda w: root_locus(w, ("omega0", 9.0, 10.0)), False),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's palette, told apart by colour-blind readers too.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
+PALETTE = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
 FIGURE_ENDINGS = (".pdf", ".png", ".svg")
 
 
@@ -41,8 +42,8 @@ def new_axes(width: float = 6.4, height: float = 4.2) -> Axes:
     return new_figure(width, height).add_subplot()
 
 
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure by the file's ending, whole or not at all.
+def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
+    """Write a figure, or that of some Axes, by the file's ending, whole or not at all.
 
     Raises
     ------
@@ -52,6 +53,8 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     check_figure_path(path)
     metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     ending = Path(path).suffix.lower()
+    figure = drawn.get_figure(root=True)
+    assert figure is not None
     with replacing(path) as file:
         import matplotlib as mpl
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.charts.counting_scan import LoopMatrices, Matrices, count_right
@@ -25,6 +26,7 @@ _CHUNK = 400_000
 _GRID_TURN = 1.0
 _GRID_LINES = 3
 _GRID_ROUNDS = 12
+_SHARP = {"xatol": 1e-12, "xrtol": 1e-12}
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,43 +229,19 @@ def _zeros(
     rows, columns = np.nonzero(change)
     left, right = grid[columns].copy(), grid[columns + 1].copy()
     left[columns == 0] = 1e-3 * grid[1]
-    sign_left = ~np.signbit(g[rows, columns + 1])
-    extra_rows, extra_left, extra_right, extra_sign = _dips(loops, g, grid, line)
-    rows = np.concatenate([rows, extra_rows])
-    left, right = np.concatenate([left, extra_left]), np.concatenate([right, extra_right])
-    sign_left = np.concatenate([sign_left, extra_sign])
+    more_rows, more_left, more_right = _dips(loops, g, grid, line)
+    rows = np.concatenate([rows, more_rows])
+    left, right = np.concatenate([left, more_left]), np.concatenate([right, more_right])
     chosen = loops.take(rows)
 
     def evaluate(omega: FloatArray, index: np.ndarray) -> FloatArray:
         a, b = chosen.take(index).values(omega, line)
         return np.asarray((a * b.conj()).imag)
 
-    everyone = np.arange(rows.size)
-    # Illinois: regula falsi that halves a value which stays on its side twice.
-    f_left, f_right = evaluate(left, everyone), evaluate(right, everyone)
-    side = np.zeros(rows.size)
-    root = 0.5 * (left + right)
-    active = everyone
-    for _ in range(60):
-        if not active.size:
-            break
-        a, b, fl, fr = left[active], right[active], f_left[active], f_right[active]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = (a * fr - b * fl) / (fr - fl)
-        new = np.where((new > a) & (new < b), new, 0.5 * (a + b))
-        value = evaluate(new, active)
-        goes_left = np.signbit(value) == np.signbit(fl)
-        done = (np.abs(new - root[active]) < 1e-13 * (1.0 + new)) | (value == 0.0)
-        root[active] = new
-        was = side[active]
-        left[active] = np.where(goes_left, new, a)
-        f_left[active] = np.where(goes_left, value, np.where(was == 1.0, 0.5 * fl, fl))
-        right[active] = np.where(goes_left, b, new)
-        f_right[active] = np.where(goes_left, np.where(was == -1.0, 0.5 * fr, fr), value)
-        side[active] = np.where(goes_left, -1.0, 1.0)
-        done |= right[active] - left[active] < 1e-14 * (1.0 + new)
-        active = active[~done]
-    return rows, root
+    found = elementwise.find_root(
+        evaluate, (left, right), args=(np.arange(rows.size),), tolerances=_SHARP
+    )
+    return rows, found.x
 
 
 def _near_zero(loops: AffineLoops, grid: FloatArray, line: float) -> FloatArray:
@@ -274,9 +252,9 @@ def _near_zero(loops: AffineLoops, grid: FloatArray, line: float) -> FloatArray:
 
 def _dips(
     loops: AffineLoops, g: FloatArray, grid: FloatArray, line: float
-) -> tuple[np.ndarray, FloatArray, FloatArray, np.ndarray]:
+) -> tuple[np.ndarray, FloatArray, FloatArray]:
     """Split intervals in which a parabola through three samples crosses zero twice."""
-    empty = (np.zeros(0, dtype=int), np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
+    empty = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
     if grid.size < 4:
         return empty
     left, middle, right = g[:, 1:-2], g[:, 2:-1], g[:, 3:]
@@ -303,12 +281,11 @@ def _dips(
     a, b = loops.take(rows).values(vertex, line)
     value = (a * b.conj()).imag
     hit = (np.signbit(value) != np.signbit(y1)) & (vertex > x0) & (vertex < x2)
-    rows, vertex, x0, x2, sign = rows[hit], vertex[hit], x0[hit], x2[hit], np.signbit(y1[hit])
+    rows, vertex, x0, x2 = rows[hit], vertex[hit], x0[hit], x2[hit]
     return (
         np.concatenate([rows, rows]),
         np.concatenate([x0, vertex]),
         np.concatenate([vertex, x2]),
-        np.concatenate([sign, ~sign]),
     )
 
 

@@ -20,7 +20,8 @@ from drillctrl.spectrum.count import UNDECIDED, count_many, follow, is_small
 LoopMatrices = tuple[FloatArray, FloatArray, FloatArray]
 Matrices = Callable[[FloatArray, FloatArray], LoopMatrices]
 _SAMPLES = 65
-_HALVINGS = 34
+# To some 1e-10 of the line.
+_HALVINGS = 27
 
 
 def count_right(matrices: LoopMatrices, line: float) -> IntArray:

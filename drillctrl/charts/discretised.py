@@ -74,9 +74,7 @@ class GainSurface:
         drawn = ax.contourf(
             self.x, self.y, self.radius, levels=levels, cmap="cividis", extend="both"
         )
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        figure.colorbar(drawn, ax=ax, label=f"ρ(D), m = {self.m}, order {self.order}")
+        ax.figure.colorbar(drawn, ax=ax, label=f"ρ(D), m = {self.m}, order {self.order}")
         draw_curves(ax, self.chart.curves, "black", "exact boundary")
         gains = self.optimum.K1.ravel(), self.optimum.K2.ravel()
         vector = self.optimum.structure.vector(*gains) if self.optimum.structure else None
@@ -126,18 +124,13 @@ def gain_surface(
         raise InputError("structure", chosen.name, "one with two gains")
     case = as_case(point)
     plant = case.system(chosen.inputs)
-    x, y = (
-        np.linspace(low, high, number) for low, high in zip(chosen.lower, chosen.upper, strict=True)
-    )
+    x, y = (np.linspace(*ends, number) for ends in chosen.gain_bounds.values())
     radius = np.empty((number, number))
     for i, second in enumerate(y):
         for j, first in enumerate(x):
             loop = close_loop(plant, chosen, *chosen.gains([first, second]))
             radius[i, j] = semidiscretize(loop, m, order).spectral_radius
-    axes = [
-        (name, float(low), float(high))
-        for name, low, high in zip(chosen.gain_names, chosen.lower, chosen.upper, strict=True)
-    ]
+    axes = [(name, *ends) for name, ends in chosen.gain_bounds.items()]
     fixed = chosen.gains(np.zeros(2))
     exact = chart(point, axes[0], axes[1], chosen, *fixed)
     optimum = design(case, chosen, trials=False)
@@ -179,9 +172,7 @@ class RootLocus:
         many = np.repeat(self.values, self.multipliers.shape[1])
         points = self.multipliers.ravel()
         drawn = ax.scatter(points.real, points.imag, c=many, s=6, cmap="cividis")
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        figure.colorbar(drawn, ax=ax, label=axis_text(self.axis))
+        ax.figure.colorbar(drawn, ax=ax, label=axis_text(self.axis))
         ax.set_aspect("equal")
         ax.set_xlabel("Re")
         ax.set_ylabel("Im")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
+from drillctrl.base.figure import BLUE, GREY, PALETTE, new_axes
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, stable_strips
 
@@ -202,9 +202,7 @@ def plot_chart(
         )
         drawn.set_array(np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
-        figure = ax.get_figure(root=True)
-        assert figure is not None
-        bar = figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
+        bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
         bar.set_label("frequency of the crossing root, |Im s|")
     _label_regions(ax, plane, regions)
     label_axes(ax, plane)
@@ -240,9 +238,8 @@ def plot_charts(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
         By default new ones.
     """
     ax = new_axes() if ax is None else ax
-    palette = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
     for rank, (label, chart) in enumerate(charts.items()):
-        colour, style = palette[rank % len(palette)], STYLES[rank % len(STYLES)]
+        colour, style = PALETTE[rank % len(PALETTE)], STYLES[rank % len(STYLES)]
         strips = stable_strips(chart.lines, rows=chart.rows)
         draw_strips(ax, strips, colour, "_nolegend_", alpha=0.10)
         draw_curves(ax, chart.curves, colour, f"{label} (area {chart.stable_area:.5g})", style)

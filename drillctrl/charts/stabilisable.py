@@ -109,15 +109,7 @@ class StabilisableChart:
             "K1": None,
             "K2": None,
             "optimised": True,
-            "bounds": {
-                name: [low, high]
-                for name, low, high in zip(
-                    structure.gain_names,
-                    structure.lower.tolist(),
-                    structure.upper.tolist(),
-                    strict=True,
-                )
-            },
+            "bounds": {name: list(ends) for name, ends in structure.gain_bounds.items()},
             "level": self.level,
             "stable_area": self.stable_area,
             "stable_area_error": self.area_error,
@@ -148,10 +140,7 @@ class StabilisableChart:
         """Return a text for people."""
         plane, structure = self.plane, self.structure
         bounds = ", ".join(
-            f"{name} in [{low:g}, {high:g}]"
-            for name, low, high in zip(
-                structure.gain_names, structure.lower, structure.upper, strict=True
-            )
+            f"{name} in [{low:g}, {high:g}]" for name, (low, high) in structure.gain_bounds.items()
         )
         goal = "stabilise" if self.level == 0.0 else f"put all roots left of {self.level:g}"
         alone = self.open_loop

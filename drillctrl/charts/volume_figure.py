@@ -58,8 +58,7 @@ def plot_volume(
     ax.set_xlabel(axis_text(plane.x))
     ax.set_ylabel(axis_text(z))
     ax.set_zlabel(axis_text(plane.y))
-    figure = ax.get_figure(root=True)
-    figure.colorbar(drawn, ax=ax, shrink=0.7, pad=0.12, label=axis_text(plane.y))
+    ax.figure.colorbar(drawn, ax=ax, shrink=0.7, pad=0.12, label=axis_text(plane.y))
     ax.set_title(title, fontsize="medium")
     return ax
 

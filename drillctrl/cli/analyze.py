@@ -11,7 +11,7 @@ from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
     NOT_STABILISED,
     check_outputs,
-    deliver,
+    deliver_roots,
     root_output_options,
     trials_option,
     wants_trials,
@@ -61,6 +61,6 @@ def analyze_command(
     scales = scales_at(where, structure)
     gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
     result = analyze(where, structure, *gains, m=m, order=order, trials=wants_trials(trials))
-    deliver(result, prove, as_json, out, plot)
+    deliver_roots(result, prove, as_json, out, plot)
     if require_stable and (not result.stable or result.verdict.refused):
         raise click.exceptions.Exit(NOT_STABILISED)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import click
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import (
-    check_figure,
-    check_json,
-    json_text,
-    write_figure,
-    write_json,
-)
+from drillctrl.cli.output import check_figure, check_json, deliver
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.verb import Verb
 
@@ -79,14 +74,8 @@ def bit_command(
         most_periods=most_periods,
         ripple=not imposed,
     )
-    fields = motion_fields(found)
-    if out is not None:
-        write_json(out, fields)
-    if plot is not None:
-        figure = found.plot().get_figure(root=True)
-        assert figure is not None
-        write_figure(plot, figure)
-    click.echo(json_text(fields) if as_json else motion_summary(found))
+    text = functools.partial(motion_summary, found)
+    deliver(motion_fields(found), text, found.plot, as_json=as_json, out=out, plot=plot)
 
 
 def _read(amplitudes: str | None) -> list[float] | None:

@@ -14,9 +14,7 @@ from drillctrl.cli.output import (
     check_figure,
     check_folder,
     check_json,
-    json_text,
-    write_figure,
-    write_json,
+    deliver,
     writing,
 )
 from drillctrl.cli.point import point_options, read_point
@@ -157,14 +155,7 @@ def chart_command(
         from drillctrl.charts.chart import chart
 
         result = chart(where, x, y, structure, *gains, level=level)
-    fields = result.to_dict()
-    if out is not None:
-        write_json(out, fields)
-    if plot is not None:
-        figure = result.plot().get_figure(root=True)
-        assert figure is not None
-        write_figure(plot, figure)
-    click.echo(json_text(fields) if as_json else result.summary())
+    deliver(result.to_dict(), result.summary, result.plot, as_json=as_json, out=out, plot=plot)
 
 
 def _gain_axis(

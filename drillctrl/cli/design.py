@@ -17,7 +17,7 @@ from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
     NOT_STABILISED,
     check_outputs,
-    deliver,
+    deliver_roots,
     root_output_options,
     trials_option,
     wants_trials,
@@ -97,7 +97,7 @@ def design_command(
         workers=workers,
     )
     on_motion = result.on_motion is not None
-    deliver(result, prove, as_json, out, plot)
+    deliver_roots(result, prove, as_json, out, plot)
     good = result.recommended is True if on_motion else result.stable
     met = good and result.requirements_met and not result.verdict.refused
     if require_stable and not met:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.point import with_damping
+from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
     from drillctrl.base.units import Dimension
     from drillctrl.tables.grid import Axis, Grid
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 _GROUPS = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades")
 _RIG = ("rig", "speed", "rop", "wob", "rock_strength")
@@ -38,9 +38,7 @@ def grid_options(command: Command) -> Command:
         click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
         click.option("--rock-strength", metavar=with_unit, help="Such as '40:80:5 MPa'."),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def read_grid(options: dict[str, Any]) -> Grid:
@@ -66,12 +64,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
             raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
     from drillctrl.drilling.point import OperatingPoint
 
-    damping = groups.pop("damping", None)
-    if damping is not None:
-        for name in ("xi", "kappa"):
-            if name in groups:
-                raise InputError(f"--{name}", groups[name], "left out where --damping is given")
-            groups[name] = damping
+    groups = with_damping(groups)
     axes = {name: _axis(name, str(groups.pop(name, "14")), None) for name in _GROUPS[:3]}
     corner = {name: axis.values[0] for name, axis in axes.items()}
     return dimensionless_grid(**axes, reference=OperatingPoint(**{**corner, **groups}))

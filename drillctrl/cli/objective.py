@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
     from drillctrl.synthesis.objectives import Objective, Requirements
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 # Options that belong to one objective, and the parameter of it that they set.
 _ERRORS = {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"}
@@ -50,9 +50,7 @@ def objective_options(command: Command) -> Command:
         click.option("--kick", type=float, help="Largest swing of the speed (drilling; 0.45)."),
         click.option("--modes", type=int, help="Torsional modes (drilling; default 1)."),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def requirement_options(command: Command) -> Command:
@@ -66,9 +64,7 @@ def requirement_options(command: Command) -> Command:
             help="Require at most this peak of control torque per disturbance torque.",
         ),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def read_requirements(options: dict[str, Any]) -> Requirements:

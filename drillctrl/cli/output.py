@@ -8,9 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -65,8 +68,25 @@ def write_json(out: str, fields: dict[str, Any]) -> None:
     writing("--out", out, lambda: write_text(out, json_text(fields) + "\n"))
 
 
-def write_figure(plot: str, figure: Figure) -> None:
+def write_figure(plot: str, drawn: Figure | Axes) -> None:
     """Write a figure by the file's ending."""
     from drillctrl.base.figure import save_figure
 
-    writing("--plot", plot, lambda: save_figure(figure, plot))
+    writing("--plot", plot, lambda: save_figure(drawn, plot))
+
+
+def deliver(
+    fields: dict[str, Any],
+    text: Callable[[], str],
+    draw: Callable[[], Figure | Axes],
+    *,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+) -> None:
+    """Print a result as text or JSON, and write the files asked for."""
+    if out is not None:
+        write_json(out, fields)
+    if plot is not None:
+        write_figure(plot, draw())
+    click.echo(json_text(fields) if as_json else text())

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
     from drillctrl.drilling.point import OperatingPoint, RigPoint
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 _DIMENSIONLESS = (
     "omega0",
@@ -52,9 +51,7 @@ def point_options(command: Command) -> Command:
         click.option("--wob", help="Weight on bit instead of --rop, such as '20 kN'."),
         click.option("--rock-strength", help="Instead of the rig's own, such as '60 MPa'."),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
@@ -80,14 +77,18 @@ def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
 def _operating_point(groups: dict[str, Any]) -> OperatingPoint:
     from drillctrl.drilling.point import OperatingPoint
 
-    values = {**_POINT_C, **groups}
-    damping = values.pop("damping", None)
-    if damping is not None:
-        for name in ("xi", "kappa"):
-            if name in groups:
-                raise InputError(f"--{name}", groups[name], "left out where --damping is given")
-            values[name] = damping
-    return OperatingPoint(**values)
+    return OperatingPoint(**{**_POINT_C, **with_damping(groups)})
+
+
+def with_damping(groups: dict[str, Any]) -> dict[str, Any]:
+    """Return the groups with ξ and κ in place of the damping that sets both."""
+    if "damping" not in groups:
+        return groups
+    for name in ("xi", "kappa"):
+        if name in groups:
+            raise InputError(f"--{name}", groups[name], "left out where --damping is given")
+    rest = {name: value for name, value in groups.items() if name != "damping"}
+    return {**rest, "xi": groups["damping"], "kappa": groups["damping"]}
 
 
 def _rig_point(given: dict[str, Any]) -> RigPoint:

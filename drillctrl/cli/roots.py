@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_figure, check_json, json_text, write_figure, write_json
+from drillctrl.cli.output import check_figure, check_json, deliver
 from drillctrl.cli.progress import open_stages
+from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
     from drillctrl.designs.result import Analysis
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 NOT_STABILISED = 3
 
@@ -28,9 +28,7 @@ def root_output_options(command: Command) -> Command:
         click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json."),
         click.option("--plot", type=click.Path(), help="Draw the roots: FILE.png, .svg, .pdf."),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def trials_option(default: str) -> Callable[[Command], Command]:
@@ -62,7 +60,7 @@ def check_outputs(out: str | None, plot: str | None) -> None:
     check_figure(plot)
 
 
-def deliver(
+def deliver_roots(
     result: Analysis, prove: bool, as_json: bool, out: str | None, plot: str | None
 ) -> None:
     """Print all that is said of the result, and write the files asked for."""
@@ -71,18 +69,10 @@ def deliver(
     with open_stages() as tell:
         told = report(result, tell)
     proof = result.prove() if prove else None
-    fields: dict[str, Any] = {}
-    if as_json or out is not None:
-        fields = told.to_dict()
-        if proof is not None:
-            fields["certificate"]["proof"] = dataclasses.asdict(proof)
-    if out is not None:
-        write_json(out, fields)
-    if plot is not None:
-        figure = result.plot().get_figure(root=True)
-        assert figure is not None
-        write_figure(plot, figure)
-    click.echo(json_text(fields) if as_json else told.summary())
+    fields = told.to_dict()
+    if proof is not None:
+        fields["certificate"]["proof"] = dataclasses.asdict(proof)
+    deliver(fields, told.summary, result.plot, as_json=as_json, out=out, plot=plot)
     if proof is not None and not as_json:
         counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
         click.echo(

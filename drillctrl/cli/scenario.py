@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.quantity import read_quantity
+from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
     from drillctrl.base.units import Dimension
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from drillctrl.simulation.controller import Controller
     from drillctrl.simulation.scenario import Scenario
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 _CHANGE = (
     "such as 't=50,omega0=9,duration=10' (omega0, v0, psi; of a rig: speed, rop, rock-strength)"
 )
@@ -63,9 +63,7 @@ def controller_options(command: Command) -> Command:
         ),
         click.option("--seed", type=int, default=0, show_default=True, help="Of the noise."),
     ]  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def read_numbers(option: str, text: str, example: str) -> dict[str, float]:

@@ -20,6 +20,7 @@ from drillctrl.cli.scenario import (
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from drillctrl.simulation.result import Simulation
@@ -149,7 +150,7 @@ def simulate_command(
         click.echo(simulation_summary(run, multipliers))
 
 
-def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure:
+def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure | Axes:
     from drillctrl.simulation.figure import (
         plot_against_linear,
         plot_phase_portrait,
@@ -165,6 +166,4 @@ def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> 
     else:
         plane = "torsion" if figure == "phase" else "axial"
         ax = plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
-    drawn = ax.get_figure(root=True)
-    assert drawn is not None
-    return drawn
+    return ax

@@ -299,7 +299,7 @@ def reduced_loops(
             break
         some = A0[rest] if z == 0.0 else A0[rest] + z * left[rest] @ right[rest]
         values, vectors = np.linalg.eig(some)
-        inverse = _inverses(vectors)
+        inverse = inverses(vectors)
         condition = np.linalg.norm(inverse, axis=(1, 2))
         safe = np.flatnonzero(condition < _SAFE_CONDITION)
         place = rest[safe]
@@ -311,11 +311,11 @@ def reduced_loops(
     return ReducedLoops(A0, left, right, delays, factor, poles, residues)
 
 
-def _inverses(matrices: ComplexArray) -> ComplexArray:
-    """Return the inverse of each matrix, infinite where there is none."""
+def inverses(matrices: ComplexArray) -> ComplexArray:
+    """Return the inverse of each matrix, NaN where it is singular to the last bit."""
     try:
         return np.asarray(np.linalg.inv(matrices))
     except np.linalg.LinAlgError:
-        if len(matrices) == 1:
-            return np.full(matrices.shape, np.inf + 0j)
-        return np.concatenate([_inverses(matrix[None]) for matrix in matrices])
+        singular = (np.linalg.det(matrices) == 0.0)[:, None, None]
+        some = np.where(singular, np.eye(matrices.shape[-1]), matrices)
+        return np.asarray(np.where(singular, np.nan, np.linalg.inv(some)))

@@ -106,7 +106,7 @@ class FeedbackStructure:
                 raise InputError(f"factor of the tie of {tie.gain}", 0.0, "not zero")
         if len(followers) < len(self.ties):
             raise InputError("ties", [tie.gain for tie in self.ties], "one for each gain")
-        for name, low, high in zip(self.gain_names, self.lower, self.upper, strict=True):
+        for name, (low, high) in self.gain_bounds.items():
             if low >= high:
                 raise InputError(f"bound {name}", f"{low:g}:{high:g}", "wider, with its ties")
 
@@ -142,6 +142,12 @@ class FeedbackStructure:
     def gain_names(self) -> tuple[str, ...]:
         """Names of the free gains in the order of the vector."""
         return tuple(n for n, free in zip(self.entry_names, self.free, strict=True) if free)
+
+    @property
+    def gain_bounds(self) -> dict[str, tuple[float, float]]:
+        """Least and largest value of each free gain by its name."""
+        ends = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
+        return dict(zip(self.gain_names, ends, strict=True))
 
     @functools.cached_property
     def spread(self) -> FloatArray:

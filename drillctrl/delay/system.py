@@ -176,13 +176,15 @@ class DelaySystem:
 
         It is the system itself where that is so already. Inputs, outputs and roots stay.
         """
-        total = np.abs(self.A0)
-        for matrix in self.delayed:
-            total = total + np.abs(matrix)
+        total = self._size()
         rows, columns = total.sum(axis=1), total.sum(axis=0)
         if (rows <= _UNBALANCED * columns).all() and (columns <= _UNBALANCED * rows).all():
             return self
-        _, (scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
+        return self.rescaled()
+
+    def rescaled(self) -> DelaySystem:
+        """Return `balanced`, to the last factor of 2 even where the norms are small already."""
+        _, (scale, _) = scipy.linalg.matrix_balance(self._size(), permute=False, separate=True)
         ratio = scale[None, :] / scale[:, None]
         return replace(
             self,
@@ -191,6 +193,9 @@ class DelaySystem:
             B=self.B / scale[:, None],
             C=self.C * scale,
         )
+
+    def _size(self) -> FloatArray:
+        return np.asarray(sum((np.abs(matrix) for matrix in self.delayed), np.abs(self.A0)))
 
 
 def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

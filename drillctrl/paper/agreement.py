@@ -12,7 +12,6 @@ AGREES = "agrees"
 DIFFERS = "differs"
 MISPRINT = "misprint"
 NOT_REPRODUCIBLE = "not reproducible"
-VERDICTS = (AGREES, DIFFERS, MISPRINT, NOT_REPRODUCIBLE)
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Agreement:
     published, ours : str
         The paper's and our value, as text with their digits.
     verdict : str
-        One of `VERDICTS`.
+        One of the above.
     why : str
         The reason, or how ours was computed.
     """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,11 @@ SIZES = (0.01, 1.0)
 LARGEST = 10.0
 
 
-def campaign(tell: Callable[[int, int], None] | None = None) -> Reproduced:
+def campaign() -> Reproduced:
     """Simulate the controller of Fig. 15 over ω0 × δ0 after disturbances of many sizes."""
     grid = dimensionless_grid(
         linear_axis("omega0", 4.0, 24.0, 9), linear_axis("delta0", 0.5, 12.5, 9), 14.0
     )
-
-    def progress(_: str, done: int, total: int) -> None:
-        if tell is not None:
-            tell(done, total)
 
     found = run_campaign(
         grid,
@@ -35,7 +30,6 @@ def campaign(tell: Callable[[int, int], None] | None = None) -> Reproduced:
         sizes=SIZES,
         largest=LARGEST,
         sharpness=1.25,
-        progress=progress,
     )
     alpha, settled = found.spectral_abscissa, found.outcomes == "settled"
     # Where a run decays or grows too slowly it does not tell.

@@ -73,7 +73,8 @@ def figure_11() -> Reproduced:
 def figure_12() -> Reproduced:
     """Where some gains within ±10 stabilise."""
     figure, axes = panels(1, 1)
-    region = ("omega0", 0.0, 25.0), ("delta0", 0.0, 18.0)
+    # At lower speeds hardly anything is stable, and the many roots of long delays take minutes.
+    region = ("omega0", 0.5, 25.0), ("delta0", 0.0, 18.0)
     reach = {name: stabilisable_chart(C, *region, name) for name in ("p", "case1")}
     open_loop = reach["p"].open_loop
     label_axes(axes[0], open_loop.plane)
@@ -88,7 +89,7 @@ def figure_12() -> Reproduced:
               for c in reach["p"].curves)  # fmt: skip
     rows = [
         compared("Fig. 12", "area ratio of Case 1 with K2 ≡ 0", 8.2, ratios["p"],
-                 "exact boundaries, ω0 ≤ 25", digits=0.05),
+                 "exact boundaries, ω0 from 0.5 to 25", digits=0.05),
         compared("Fig. 12", "its top boundary, δ0 at ω0 = 12", 8.7, top,
                  "read off a figure there, exact here", digits=0.05),
         Agreement(

@@ -30,12 +30,13 @@ def printed_sign(omega0: float, delta0: float) -> float:
     return spectral_abscissa(replace(plant, A0=now, delayed=(past,)))
 
 
-def forgetful_radius(m: int = 40) -> tuple[float, float]:
+def forgetful_radius() -> tuple[float, float]:
     """Return the growth rates at F with Case 2's gains, with and without the past of θ'.
 
     A map of size 2m + 4 that keeps x and θ of the past has no place for θ'.
     """
     name, K1, K2 = AT_F["case2"]
+    m = 40
     structure = preset_structure(name)
     whole = semidiscretize(close_loop(plant_system(F), structure, K1, K2), m, 0).growth_rate
     without = [K2[0], 0.0]
@@ -43,11 +44,11 @@ def forgetful_radius(m: int = 40) -> tuple[float, float]:
     return whole, lacking
 
 
-def singular_depth(psi: float = 14.0) -> float:
+def singular_depth() -> float:
     """Return the δ0 at which A1 is singular."""
 
     def determinant(delta0: float) -> float:
-        return float(np.linalg.det(plant_system(OperatingPoint(10.0, delta0, psi)).A0))
+        return float(np.linalg.det(plant_system(OperatingPoint(10.0, delta0, 14.0)).A0))
 
     return float(scipy.optimize.brentq(determinant, 1.0, 20.0))
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 import scipy.optimize
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
@@ -83,9 +82,9 @@ class _Boxes:
         )
 
 
-def _size(matrices: ComplexArray) -> FloatArray:
-    """Return a bound of the spectral norm of each matrix."""
-    return np.asarray(np.sqrt((matrices.real**2 + matrices.imag**2).sum(axis=(-2, -1))))
+def size_bound(matrices: ComplexArray) -> FloatArray:
+    """Return a bound of the spectral norm of each matrix: Frobenius'."""
+    return np.asarray(np.linalg.norm(matrices, axis=(-2, -1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +136,9 @@ class _Line:
             by_omega = by_omega + (delay * f)[:, None, None] * change
             by_factor = by_factor + (delay * omega)[:, None, None] * change
             phase = delay * (f * h + omega * k + h * k)
-            curved += _size(change) * (0.5 * phase**2 + delay * h * k)
+            curved += size_bound(change) * (0.5 * phase**2 + delay * h * k)
         curved = np.where(values > 0.0, curved, np.inf)
-        one, other = h * _size(by_omega), k * _size(by_factor)
+        one, other = h * size_bound(by_omega), k * size_bound(by_factor)
         part = one / np.maximum(one + other, 1e-300)
         first, second = one + part * curved, other + (1.0 - part) * curved
         return np.asarray(values), np.asarray(first), np.asarray(second)
@@ -247,7 +246,7 @@ def crossings(system: DelaySystem, low: float, high: float) -> list[tuple[float,
     ArithmeticError
         If the loop is too near instability over the whole range to tell crossings apart.
     """
-    system = _balanced(system)
+    system = system.rescaled()
     axis = _Line(system, 0.0)
     boxes = _Boxes.grid(characteristic.magnitude_bound(system, 0.0), low, high, rows=16)
     found: list[tuple[float, float]] = []
@@ -272,20 +271,6 @@ def crossings(system: DelaySystem, low: float, high: float) -> list[tuple[float,
                     found.append(sharp)
         boxes = boxes.halved(by_omega[kept] >= by_factor[kept])
     raise ArithmeticError("crossings of the axis could not be told apart")
-
-
-def _balanced(system: DelaySystem) -> DelaySystem:
-    """Return the system with its states scaled so that the matrices' norms are small."""
-    total = np.abs(system.A0) + sum(np.abs(a) for a in system.delayed)
-    _, (scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
-    ratio = scale[None, :] / scale[:, None]
-    return replace(
-        system,
-        A0=system.A0 * ratio,
-        delayed=tuple(a * ratio for a in system.delayed),
-        B=system.B / scale[:, None],
-        C=system.C * scale,
-    )
 
 
 def sharpen_crossing(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.closing import close_loop
@@ -55,7 +56,7 @@ def loop_margins(
     Notes
     -----
     Each crossing of the negative real axis, and of the unit circle, is found between two
-    frequencies of a grid on which L turns little, and sharpened by bisection.
+    frequencies of a grid on which L turns little, and sharpened.
     """
 
     def transfer(omega: FloatArray) -> ComplexArray:
@@ -65,11 +66,11 @@ def loop_margins(
     closed = close_loop(plant, structure, K1, K2)
     omega = frequency_grid(closed, response=transfer, small=_SMALL)
     loop = transfer(omega)
-    crossings = _bisected(lambda w: transfer(w).imag, omega, loop.imag)
+    crossings = _zeros(lambda w: transfer(w).imag, omega, loop.imag)
     real = transfer(crossings).real if crossings.size else np.zeros(0)
     factors = -1.0 / np.append(real[real < 0.0], _at_zero(transfer))
     factors = factors[np.isfinite(factors) & (factors > 0.0)]
-    unit = _bisected(lambda w: np.abs(transfer(w)) - 1.0, omega, np.abs(loop) - 1.0)
+    unit = _zeros(lambda w: np.abs(transfer(w)) - 1.0, omega, np.abs(loop) - 1.0)
     phases = np.abs(np.angle(-transfer(unit))) if unit.size else np.zeros(0)
     return LoopMargins(
         float(factors[factors > 1.0].min(initial=math.inf)),
@@ -85,16 +86,11 @@ def _at_zero(transfer: Transfer) -> FloatArray:
     return np.asarray(value[value < 0.0])
 
 
-def _bisected(
+def _zeros(
     function: Callable[[FloatArray], FloatArray], omega: FloatArray, values: FloatArray
 ) -> FloatArray:
     """Return where a function changes sign between the points of a grid."""
     change = np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
-    low, high, sign = omega[change], omega[change + 1], np.signbit(values[change])
     if not change.size:
         return np.zeros(0)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        left = np.signbit(function(middle)) == sign
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return np.asarray(0.5 * (low + high))
+    return np.asarray(elementwise.find_root(function, (omega[change], omega[change + 1])).x)

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.system import DelaySystem
+from drillctrl.robustness.axis import size_bound
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.roots import Root, dominant_roots
@@ -142,16 +143,13 @@ def _bounded_at_once(
         change, shown = inverse @ term, seen @ term
         moved, seen_moved = moved + delay * change, seen_moved + delay * shown
         # |exp(−iφ) − 1 + iφ| ≤ φ²/2.
-        curved += 0.5 * (delay * half) ** 2 * _size(change)
-        seen_curved += 0.5 * (delay * half) ** 2 * _size(shown)
+        curved += 0.5 * (delay * half) ** 2 * size_bound(change)
+        seen_curved += 0.5 * (delay * half) ** 2 * size_bound(shown)
     values = np.linalg.norm(seen @ system.B, 2, axis=(1, 2))
-    off = half * _size(moved) + curved
-    reach = (half * _size(seen_moved) + seen_curved) * _size(np.asarray(inverse @ system.B))
+    off = half * size_bound(moved) + curved
+    reach = (half * size_bound(seen_moved) + seen_curved) * size_bound(
+        np.asarray(inverse @ system.B)
+    )
     with np.errstate(divide="ignore"):
         bounds = np.where(off < 1.0, values + reach / np.maximum(1.0 - off, 1e-300), np.inf)
     return values, bounds
-
-
-def _size(matrices: ComplexArray) -> FloatArray:
-    """Return a bound of the spectral norm of each matrix."""
-    return np.asarray(np.sqrt((matrices.real**2 + matrices.imag**2).sum(axis=(-2, -1))))

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.simulation.status import Status
@@ -112,7 +113,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         events=len(simulation.events),
         steps=simulation.steps,
         elapsed_seconds=simulation.elapsed_seconds,
-        settling_time=settling_time(simulation),
+        settling_time=_settled_from(simulation, run),
     )
 
 
@@ -131,9 +132,15 @@ def settling_time(simulation: Trace, within: float = SETTLED_WITHIN) -> float | 
     float or None
         None if the run broke off, or either is still beyond in the last tenth of it.
     """
+    return _settled_from(simulation, simulation.on_steps(PER_STEP, names=("x", "theta")), within)
+
+
+def _settled_from(
+    simulation: Trace, motion: Motion, within: float = SETTLED_WITHIN
+) -> float | None:
+    """Return `settling_time` from the whole motion."""
     if simulation.status != Status.DONE or simulation.steps == 0:
         return None
-    motion = simulation.on_steps(PER_STEP, names=("x", "theta"))
     last = 0.0
     for values in (abs(motion.x), abs(motion.theta)):
         beyond = np.flatnonzero(values > within * values.max(initial=0.0))
@@ -164,19 +171,18 @@ def _extreme(simulation: Trace, tail: Motion, name: str, *, least: bool = False)
 
 
 def section_crossings(simulation: Trace, since: float) -> FloatArray:
-    """Return the times at which θ rises through the middle of its range, by bisection."""
+    """Return the times at which θ rises through the middle of its range, sharpened."""
     tail = simulation.on_steps(PER_STEP, since, ("theta",))
     middle = 0.5 * (tail.theta.max() + tail.theta.min())
     beyond = tail.theta - middle
     rising = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
-    low, high = tail.times[rising].copy(), tail.times[rising + 1].copy()
-    for _ in range(50):
-        centre = 0.5 * (low + high)
-        if centre.size == 0:
-            break
-        before = simulation.at(centre, ("theta",)).theta < middle
-        low, high = np.where(before, centre, low), np.where(before, high, centre)
-    return np.asarray(0.5 * (low + high))
+    if not rising.size:
+        return np.zeros(0)
+    found = elementwise.find_root(
+        lambda times: simulation.at(times, ("theta",)).theta - middle,
+        (tail.times[rising], tail.times[rising + 1]),
+    )
+    return np.asarray(found.x)
 
 
 def period(simulation: Trace, since: float) -> float | None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.reduced import inverses
 
 IntArray = npt.NDArray[np.intp]
 
@@ -131,7 +132,7 @@ def _sharpened(
     for _ in range(12):
         term = np.exp(-1j * phase)[:, None, None] * late[rows]
         delta = 1j * omega[:, None, None] * eye - A0[rows] - term
-        inverse = _inverse(delta)
+        inverse = inverses(delta)
         # Derivatives of ln det Δ: a step solves by_omega δω + by_phase δφ = −1.
         new_omega = 1j * np.trace(inverse, axis1=1, axis2=2)
         new_phase = 1j * np.einsum("qij,qji->q", inverse, term)
@@ -165,13 +166,3 @@ def _sharpened(
     )
     once = np.concatenate([[True], ~same])
     return rows[once], omega[once], phase[once], direction[once]
-
-
-def _inverse(matrices: ComplexArray) -> ComplexArray:
-    """Return the inverses, infinite where a matrix is singular to the last bit."""
-    try:
-        return np.asarray(np.linalg.inv(matrices))
-    except np.linalg.LinAlgError:
-        singular = (np.linalg.det(matrices) == 0.0)[:, None, None]
-        some = np.where(singular, np.eye(matrices.shape[-1]), matrices)
-        return np.asarray(np.where(singular, np.nan, np.linalg.inv(some)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes
+from drillctrl.base.figure import GREY, PALETTE, new_axes
 from drillctrl.charts.figure import STYLES, Charted, plot_charts
 from drillctrl.studies.measures import Response
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-# The same order as in the charts.
-PALETTE = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
 MARKERS = "osD^v<"
 SHOWN = 6
 

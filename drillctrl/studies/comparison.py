@@ -35,36 +35,6 @@ if TYPE_CHECKING:
     from drillctrl.charts.chart import StabilityChart
 
 
-CSV_COLUMNS = (
-    "label",
-    "structure",
-    "designed",
-    "stable",
-    "spectral_abscissa",
-    "decay_time",
-    "stability_radius",
-    "gain_margin",
-    "gain_reduction",
-    "phase_margin",
-    "peak_sensitivity",
-    "max_abs_u",
-    "max_abs_x",
-    "settling_time",
-    "nonlinear_settling_time",
-    "nonlinear_max_abs_u",
-    "nonlinear_max_abs_x",
-    "stick_fraction",
-    "period",
-    "status",
-    "basin",
-    "formation_change",
-    "stable_area",
-    "area_ratio",
-    "recommended",
-    "reason",
-)
-
-
 OPEN_LOOP = "none"
 # Whether a larger value is the better one.
 SORTS = {
@@ -221,14 +191,15 @@ class Comparison:
 
     def to_csv(self) -> str:
         """Return one line a candidate."""
-        rows = []
+        lines = []
         for row in self.rows:
             fields = row.to_dict()
-            delays = fields["delay_margin"] or {"shorter": None, "longer": None}
-            gains = (" ".join(repr(value) for value in fields[name]) for name in ("K1", "K2"))
-            values = [fields[name] for name in CSV_COLUMNS]
-            rows.append([*values, delays["shorter"], delays["longer"], *gains])
-        return csv_text([*CSV_COLUMNS, "delay_shorter", "delay_longer", "K1", "K2"], rows)
+            delays = fields.pop("delay_margin") or {"shorter": None, "longer": None}
+            gains = {name: " ".join(map(repr, fields.pop(name))) for name in ("K1", "K2")}
+            lines.append(
+                fields | {f"delay_{side}": value for side, value in delays.items()} | gains
+            )
+        return csv_text(lines[0], (line.values() for line in lines))
 
     def to_html(self) -> str:
         """Return one page with the table and the figures in it."""

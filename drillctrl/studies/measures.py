@@ -12,6 +12,7 @@ from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.summary import settling_time
 
 MOST_FACTOR = 16.0
 # Ratio of the multiples that bracket the edge of a basin.
@@ -45,15 +46,20 @@ def respond(
     """Simulate a candidate after a disturbance; None where the linear motion only grows."""
     if design.point is None or (model == "linear" and not design.stable):
         return None
+    run = _run(design, disturbance, duration, model)
+    largest = float(np.abs(run.on_steps(9, names=("x",)).x).max())
+    return Response(run, largest, run.summary.max_abs_u, run.summary.settling_time)
+
+
+def _run(
+    design: Analysis, disturbance: Mapping[str, float], duration: float, model: str
+) -> Simulation:
     controller = None
     if design.structure is not None:
         controller = Controller(design.structure, design.K1, design.K2)
-    run = simulate(
+    return simulate(
         design.case, controller, duration=duration, initial=disturbance, model=model, rtol=1e-7
     )
-    motion = run.on_steps(9)
-    inputs = max(float(np.abs(motion.axial).max()), float(np.abs(motion.torque).max()))
-    return Response(run, float(np.abs(motion.x).max()), inputs, run.summary.settling_time)
 
 
 def basin(design: Analysis, disturbance: Mapping[str, float], duration: float) -> float | None:
@@ -67,7 +73,6 @@ def basin(design: Analysis, disturbance: Mapping[str, float], duration: float) -
 
     def settles(factor: float) -> bool:
         scaled = {name: factor * value for name, value in disturbance.items()}
-        found = respond(design, scaled, duration, "nonlinear")
-        return found is not None and found.settling_time is not None
+        return settling_time(_run(design, scaled, duration, "nonlinear")) is not None
 
     return basin_edge(settles, 1.0 / MOST_FACTOR, MOST_FACTOR, _SHARPNESS)[0]

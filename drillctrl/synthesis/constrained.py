@@ -31,8 +31,6 @@ class ConstrainedSearch:
         The best that meet all requirements; without any, those that violate them least.
     value : float
         Of the objective there.
-    feasible : bool
-        Whether the requirements are met.
     ends : tuple of float
         Objective at the distinct ends that meet them, lowest first.
     hits : int
@@ -43,7 +41,6 @@ class ConstrainedSearch:
 
     gains: FloatArray
     value: float
-    feasible: bool
     ends: tuple[float, ...]
     hits: int
     evaluations: int
@@ -126,8 +123,7 @@ def constrained_search(
             gains = np.clip(gains, lower + 1e-6 * margin, upper - 1e-6 * margin)
     if np.isfinite(watched.best[0]):
         _finish(watched, lower, upper)
-    feasible = bool(np.isfinite(watched.best[0]))
-    value, gains = watched.best if feasible else watched.nearest[1:]
+    value, gains = watched.best if np.isfinite(watched.best[0]) else watched.nearest[1:]
     # A bound that is approached to rounding is meant.
     for bound in (lower, upper):
         gains = np.where(np.abs(gains - bound) < 1e-9 * (upper - lower), bound, gains)
@@ -136,7 +132,7 @@ def constrained_search(
         if not distinct or end > distinct[-1] + 1e-3 * (1.0 + abs(end)):
             distinct.append(end)
     hits = sum(end < value + 1e-4 * (1.0 + abs(value)) for end in ends)
-    return ConstrainedSearch(gains, value, feasible, tuple(distinct), hits, watched.calls)
+    return ConstrainedSearch(gains, value, tuple(distinct), hits, watched.calls)
 
 
 def _finish(watched: _Watched, lower: FloatArray, upper: FloatArray) -> None:

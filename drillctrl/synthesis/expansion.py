@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.system import DelaySystem
-from drillctrl.spectrum.quasipolynomial import from_matrices
 
 # Differences of coefficients below this, relative, are rounding.
 _NOISE = 1e-13
+# Radius of the circle for s: the roots that matter have modulus 0.5 to 10.
+_RADIUS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +66,34 @@ def expand(
     now = [zero, *(zero if is_late else term for term, is_late in zip(terms, late, strict=True))]
     past = [zero, *(term if is_late else zero for term, is_late in zip(terms, late, strict=True))]
     delayed = plain.delayed[0] if plain.delays else zero
-    delays = np.full(len(now), plain.max_delay)
-    table = from_matrices(plain.A0 + np.array(now), delayed + np.array(past), delays).coefficients
+    table = _coefficients(plain.A0 + np.array(now), delayed + np.array(past))
     table[1:] -= table[0]
     table[1:][np.abs(table[1:]) < _NOISE * np.abs(table[0]).max()] = 0.0
     return Expansion(np.ascontiguousarray(table.transpose(0, 2, 1)), plain.max_delay)
+
+
+def _coefficients(a0: FloatArray, a1: FloatArray) -> FloatArray:
+    """Return c[j, k] of det(sI − A0 − E A1) = Σ c[j, k] s^j E^k for N loops, (N, n + 1, r + 1).
+
+    The degree in E = exp(−sτ) is at most the rank of A1. The coefficients are read off the
+    matrices by sampling both variables on circles, so the physics stays where it is written.
+    """
+    order = a0.shape[-1]
+    rows = np.flatnonzero(a1.any(axis=(0, 2))).size
+    degree = min(rows, np.flatnonzero(a1.any(axis=(0, 1))).size)
+    s = _RADIUS * np.exp(2j * np.pi * np.arange(order + 1) / (order + 1))
+    z = np.exp(2j * np.pi * np.arange(degree + 1) / (degree + 1))
+    pencil = (
+        s[:, None, None, None] * np.eye(order)
+        - a0[:, None, None]
+        - z[None, :, None, None] * a1[:, None, None]
+    )
+    samples = np.linalg.det(pencil)
+    table = np.fft.fft2(samples, axes=(1, 2)).real / samples[0].size
+    # What the transform leaves of a coefficient that is zero is noise.
+    floor = 1e-12 * np.abs(samples).max(axis=(1, 2), keepdims=True)
+    table[np.abs(table) <= floor] = 0.0
+    return np.asarray(table / (_RADIUS ** np.arange(order + 1))[:, None])
 
 
 @functools.lru_cache(maxsize=32)

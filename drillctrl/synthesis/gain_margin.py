@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
@@ -196,12 +197,7 @@ def _isolated(family: LoopFamily, line: float) -> list[_Piece]:
     change = np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
     if change.size == 0:
         return []
-    low, high, sign = omega[change], omega[change + 1], np.signbit(values[change])
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        left = np.signbit(imaginary(middle)) == sign
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    found = 0.5 * (low + high)
+    found = elementwise.find_root(imaginary, (omega[change], omega[change + 1])).x
     gains = solve(found)
     return [
         _Piece(found[i : i + 1], gains[i : i + 1], solve, lambda at: at) for i in range(found.size)

@@ -112,18 +112,6 @@ def _key(task: NodeTask) -> tuple[int, bytes, Active]:
     return task.index, np.array(task.known).tobytes(), task.active
 
 
-def neighbours(shape: tuple[int, ...], index: int, reach: int = 1) -> list[int]:
-    """Return the nodes beside a node along the axes, at a distance of ``reach``."""
-    place = np.unravel_index(index, shape)
-    beside = []
-    for axis, step in itertools.product(range(len(shape)), (-reach, reach)):
-        other = [int(i) for i in place]
-        other[axis] += step
-        if 0 <= other[axis] < shape[axis]:
-            beside.append(int(np.ravel_multi_index(other, shape)))
-    return beside
-
-
 def edges(shape: tuple[int, ...]) -> npt.NDArray[np.intp]:
     """Return all pairs of neighbouring nodes, (e, 2)."""
     index = np.arange(math.prod(shape)).reshape(shape)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -213,16 +212,16 @@ def find_design(checkpoint: Checkpoint, task: NodeTask) -> NodeDesign | None:
         return None
     return NodeDesign(
         task.index,
-        _array(entry["gains"]),
-        float.fromhex(entry["spectral_abscissa"]),
-        float.fromhex(entry["stationarity"]),
-        tuple(_array(basin) for basin in entry["basins"]),
-        tuple(ActiveRoot(float.fromhex(omega), count) for omega, count in entry["roots"]),
+        np.array(entry["gains"]),
+        entry["spectral_abscissa"],
+        entry["stationarity"],
+        tuple(np.array(basin) for basin in entry["basins"]),
+        tuple(ActiveRoot(*root) for root in entry["roots"]),
     )
 
 
 def keep_design(checkpoint: Checkpoint, task: NodeTask, design: NodeDesign) -> None:
-    """Append a design; its numbers are text that keeps every bit.
+    """Append a design; JSON keeps every bit of its numbers.
 
     Raises
     ------
@@ -230,11 +229,11 @@ def keep_design(checkpoint: Checkpoint, task: NodeTask, design: NodeDesign) -> N
         If the disk is full or the file is gone.
     """
     entry = {
-        "gains": _text(design.gains),
-        "spectral_abscissa": float(design.spectral_abscissa).hex(),
-        "stationarity": float(design.stationarity).hex(),
-        "basins": [_text(basin) for basin in design.basins],
-        "roots": [[root.omega.hex(), root.multiplicity] for root in design.roots],
+        "gains": design.gains.tolist(),
+        "spectral_abscissa": float(design.spectral_abscissa),
+        "stationarity": float(design.stationarity),
+        "basins": [basin.tolist() for basin in design.basins],
+        "roots": [dataclasses.astuple(root) for root in design.roots],
     }
     checkpoint.keep(task_key(task), entry)
 
@@ -257,11 +256,3 @@ def task_key(task: NodeTask) -> str:
     rest = task.seed, known, active, task.objective
     text = repr((task.index, point, structure, ties, *rest))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
-
-
-def _text(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:
-    return [float(value).hex() for value in values]
-
-
-def _array(values: list[str]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    return np.array([float.fromhex(value) for value in values])

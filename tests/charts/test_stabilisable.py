@@ -41,7 +41,7 @@ def test_margin_agrees_with_the_search_over_gains(name):
     signs = []
     for omega0, delta0 in zip(rng.uniform(3.0, 25.0, 6), rng.uniform(0.2, 17.0, 6), strict=True):
         point = POINT.with_changes(omega0=omega0, delta0=delta0)
-        best = design(point, name).spectral_abscissa
+        best = design(point, name, trials=False).spectral_abscissa
         if abs(best) > 1e-3:
             assert (margin_at(point, name)[0].margin < 0.0) == (best < 0.0)
             signs.append(best < 0.0)

@@ -122,7 +122,9 @@ def test_gain_surface_has_the_values_of_single_loops():
 
     loop = close_loop(plant_system(POINT), preset_structure("case1"), [-5.0], [5.0])
     assert surface.radius[3, 1] == pytest.approx(semidiscretize(loop, 3, 0).spectral_radius)
-    assert surface.optimum.spectral_abscissa == design(POINT, "case1").spectral_abscissa
+    assert (
+        surface.optimum.spectral_abscissa == design(POINT, "case1", trials=False).spectral_abscissa
+    )
     # The paper's minimum is no minimum of its own measure either.
     finer = gain_surface(POINT, m=3, order=0, count=41)
     assert finer.lowest[2] < 0.97933 - 1e-3

@@ -62,7 +62,7 @@ def test_bad_input_is_one_line(capsys, arguments):
     assert err.count("\n") == 1
 
 
-NODES = ("--omega0", "9:11:2", "--delta0", "1:2:2")
+NODES = ("--omega0", "9:11:2", "--delta0", "1:2:2", "--trials", "none")
 
 
 @pytest.mark.parametrize(

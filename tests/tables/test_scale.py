@@ -12,8 +12,10 @@ from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_tab
 from drillctrl.base.checkpoint import Checkpoint
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
-QUICK = ["table", "--omega0", "6:22:9", "--delta0", "1:11:5", "--out"]
-SLOW = ["table", "--omega0", "6:22:5", "--delta0", "1:11:3", "--structure", "case2", "--out"]
+# Trials are no part of a checkpoint.
+QUICK = ["table", "--omega0", "6:22:5", "--delta0", "1:11:4", "--trials", "none", "--out"]
+# Many nodes, the first of them soon done.
+MANY = ["table", "--omega0", "6:22:17", "--delta0", "1:11:9", "--trials", "none", "--out"]
 
 
 def same(one, other):
@@ -135,7 +137,7 @@ def test_a_disk_without_room_is_one_line_and_leaves_the_old_file(room, refused, 
     out = tmp_path / "gains.json"
     out.write_text("old")
     program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9:11:2"]
-    program += ["--delta0", "1:2:2", "--out", str(out)]
+    program += ["--delta0", "1:2:2", "--trials", "none", "--out", str(out)]
 
     # The system itself refuses to write files on, as on a full disk.
     def little_room():
@@ -166,7 +168,7 @@ def test_a_scheduler_that_does_not_answer_is_refused(address, tmp_path):
 
 
 def test_controllers_on_the_command_line(capsys, tmp_path):
-    base = ["table", "--omega0", "8:14:2", "--delta0", "1:6:2"]
+    base = ["table", "--omega0", "8:14:2", "--delta0", "1:6:2", "--trials", "none"]
     for name in ("gains.c", "gains.st"):
         out = str(tmp_path / name)
         with pytest.raises(SystemExit) as stop:
@@ -195,7 +197,7 @@ def test_the_result_does_not_depend_on_the_order_of_nodes(small):
 @pytest.fixture
 def two_workers(tmp_path):
     """A command with two processes, and the processes, once both are at work."""
-    program = [sys.executable, "-m", "drillctrl", *SLOW, "gains.csv", "--workers", "2"]
+    program = [sys.executable, "-m", "drillctrl", *MANY, "gains.csv", "--workers", "2"]
 
     # Whoever runs the tests in the background has interrupts ignored.
     def listen():
@@ -259,6 +261,7 @@ def test_workers_end_when_the_command_is_killed(two_workers):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_standard_output_without_room_is_one_line():
     program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9", "--delta0", "1"]
+    program += ["--trials", "none"]
     with open("/dev/full", "w") as full:
         run = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 2

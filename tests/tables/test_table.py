@@ -25,7 +25,10 @@ from drillctrl.tables.interpolation import Cells
 def test_nodes_are_as_good_as_single_designs_and_agree_with_analyze(small):
     K1, K2 = small.gains_at(*np.array([[p.omega0, p.delta0, p.psi] for p in small.grid.points]).T)
     for i, point in enumerate(small.grid.points):
-        assert small.spectral_abscissa[i] <= design(point, "case1").spectral_abscissa + 1e-4
+        assert (
+            small.spectral_abscissa[i]
+            <= design(point, "case1", trials=False).spectral_abscissa + 1e-4
+        )
         again = analyze(point, "case1", K1[i], K2[i])
         # Interpolated at a node: equal up to rounding, which a triple root shows as its cube root.
         assert again.spectral_abscissa == pytest.approx(small.spectral_abscissa[i], abs=1e-4)
@@ -102,9 +105,8 @@ def test_a_worker_more_changes_nothing(small):
 def test_one_node_and_three_axes():
     single = table(dimensionless_grid(10.0, 1.75, 14.0), "p", trials=False)
     assert single.jump == (0.0, None)
-    assert (
-        single.spectral_abscissa[0] == design(OperatingPoint(10, 1.75, 14), "p").spectral_abscissa
-    )
+    alone = design(OperatingPoint(10, 1.75, 14), "p", trials=False)
+    assert single.spectral_abscissa[0] == alone.spectral_abscissa
     cube = table(
         dimensionless_grid(
             Axis("omega0", (9.0, 10.0)), Axis("delta0", (1.0, 2.0)), Axis("psi", (14.0, 18.0))
