@@ -60,6 +60,7 @@ from .drilling.rig import save_rig as save_rig
 from .drilling.rig import table1 as table1
 from .drilling.sensors import Filtered as Filtered
 from .drilling.sensors import Lagging as Lagging
+from .drilling.sensors import LateInput as LateInput
 from .drilling.steady import SteadyState as SteadyState
 from .drilling.steady import rig_point_at_weight_on_bit as rig_point_at_weight_on_bit
 from .drilling.steady import steady_state as steady_state
