@@ -131,6 +131,7 @@ from .strings.drive_control import DriveControl as DriveControl
 from .strings.drive_control import DriveMachine as DriveMachine
 from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
+from .strings.drive_measures import DriveMeasures as DriveMeasures
 from .strings.drive_rules import fastest_control as fastest_control
 from .strings.drive_rules import pi_control as pi_control
 from .strings.drive_rules import rule_control as rule_control
@@ -138,6 +139,9 @@ from .strings.drive_rules import soft_torque_control as soft_torque_control
 from .strings.drive_rules import stiff_control as stiff_control
 from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
+from .strings.drives import DriveComparison as DriveComparison
+from .strings.drives import compare_drives as compare_drives
+from .strings.drives import drive_control as drive_control
 from .strings.exact import ExactLoop as ExactLoop
 from .strings.exact import exact_loop as exact_loop
 from .strings.falling import FallingTorque as FallingTorque

