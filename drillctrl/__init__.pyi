@@ -131,6 +131,7 @@ from .strings.drive_control import DriveControl as DriveControl
 from .strings.drive_control import DriveMachine as DriveMachine
 from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
+from .strings.drive_law import driven_plant as driven_plant
 from .strings.drive_measures import DriveMeasures as DriveMeasures
 from .strings.drive_rules import fastest_control as fastest_control
 from .strings.drive_rules import pi_control as pi_control
@@ -148,6 +149,9 @@ from .strings.falling import FallingTorque as FallingTorque
 from .strings.files import load_rig as load_rig
 from .strings.files import read_tally as read_tally
 from .strings.model import PipeString as PipeString
+from .strings.named_roots import NamedRoot as NamedRoot
+from .strings.named_roots import NamedRoots as NamedRoots
+from .strings.named_roots import named_roots as named_roots
 from .strings.presets import string_preset as string_preset
 from .strings.rig import StringRig as StringRig
 from .strings.rig import lump as lump

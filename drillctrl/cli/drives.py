@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.gains import gain_scales, read_gains
 from drillctrl.cli.output import check_figure, json_text, write_figure, writing
+from drillctrl.cli.verb import naming
+
+if TYPE_CHECKING:
+    from drillctrl.drilling.case import Case
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -54,6 +60,56 @@ def refuse_drive_options(options: Mapping[str, Any]) -> None:
         if options[name] is not None:
             wanted = "left out, or given with structures of a top drive such as stiff"
             raise InputError(f"--{name}", options[name], wanted)
+
+
+def driven_case(
+    where: OperatingPoint | RigPoint, structure: str, k1: str | None, k2: str | None, tried: bool
+) -> Case:
+    """Return the case of a rig that is turned by a drive under a law.
+
+    Parameters
+    ----------
+    where : RigPoint
+        Where it drills.
+    structure : str
+        The law.
+    k1, k2 : str or None
+        Gains of a PI law on the top's angle and speed; without them its rule's.
+    tried : bool
+        Whether trial runs are wanted.
+
+    Raises
+    ------
+    InputError
+        If there is no rig with a top drive, or an option does not fit.
+    """
+    from drillctrl.drilling.case import as_case
+    from drillctrl.drilling.plant import top_drive_plant
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.drilling.structures import soft_torque
+    from drillctrl.strings.drive_law import driven_plant
+    from drillctrl.strings.drives import drive_control, given_control, machine_of
+    from drillctrl.strings.rig import StringRig
+
+    if not isinstance(where, RigPoint):
+        raise InputError("--structure", structure, "used with --rig: it turns a string")
+    if k2 is not None:
+        raise InputError("--K2", k2, f"left out: {structure} feeds back nothing delayed")
+    if tried:
+        raise InputError("--trials", "all", "none for structures of a top drive")
+    machine_of(where.rig)
+    assert isinstance(where.rig, StringRig)
+    if k1 is None:
+        control = drive_control(structure, where.rig)
+    else:
+        scales = gain_scales(soft_torque(), top_drive_plant(1.0), where.rig)
+        with naming("--K1", "K1"):
+            gains = read_gains("K1", k1, scales)
+            assert gains is not None
+            assert scales is not None
+            si = [gain * scale for gain, (scale, _) in zip(gains, scales, strict=False)]
+            control = given_control(structure, where.rig, si[0], si[1])
+    return as_case(where, driven_plant(where.rig, control))
 
 
 def _check_options() -> None:

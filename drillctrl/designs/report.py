@@ -15,6 +15,7 @@ from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
 from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines, set_out
 from drillctrl.robustness.margins import ParameterMargin
+from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.synthesis.boundary import BoundaryDecision, decide
 from drillctrl.synthesis.family import loop_family
 
@@ -60,6 +61,8 @@ class Report:
         Beside a stable design that minimises α and is not refused.
     remedies : tuple of Remedy
         What else stabilises the point, if a design does not.
+    modes : NamedRoots or None
+        Roots by the modes of a string of pipe, and the drive that turns it.
     """
 
     result: Analysis
@@ -67,12 +70,17 @@ class Report:
     boundary: BoundaryDecision | None
     alternative: Alternative | None
     remedies: tuple[Remedy, ...]
+    modes: NamedRoots | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
         fields = self.result.to_dict()
         found = self.robustness
         fields["robustness"] = None if found is None else found.to_dict()
+        if self.modes is not None:
+            fields |= self.modes.to_dict()
+            if self.modes.control is not None:
+                fields["structure"] = self.modes.control.name
         if isinstance(self.result, Design):
             decision, other = self.boundary, self.alternative
             fields["certificate"]["boundary"] = decision and {
@@ -92,6 +100,8 @@ class Report:
             lines += _remedy_lines(design, self.remedies)
         else:
             lines = result_lines(design)
+        if self.modes is not None:
+            lines += self.modes.lines
         if self.robustness is not None:
             lines += _robustness_lines(design, self.robustness)
         if self.alternative is not None:
@@ -123,8 +133,9 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
     if result.structure is not None:
         at("margins")
         stands = robustness_of(result)
+    modes = named_roots(result.case, result.structure, result.K1, result.K2)
     if not isinstance(result, Design):
-        return Report(result, stands, None, None, ())
+        return Report(result, stands, None, None, (), modes)
     at("bounds")
     decision = boundary_decision(result)
     other = None
@@ -134,7 +145,7 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
         other = Alternative(found, robustness_of(found))
     if not result.stable:
         at("what would stabilise")
-    return Report(result, stands, decision, other, remedies(result))
+    return Report(result, stands, decision, other, remedies(result), modes)
 
 
 def boundary_decision(design: Design) -> BoundaryDecision | None:

@@ -13,7 +13,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_design import dynamic_drive_control
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
-from drillctrl.strings.drive_rules import RULES, rule_control
+from drillctrl.strings.drive_rules import RULES, pi_control, rule_control
 from drillctrl.strings.drives_words import comparison_summary
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
@@ -111,6 +111,32 @@ def drive_control(name: str, rig: StringRig) -> DriveControl:
     if name not in RULES:
         raise InputError("structure", name, f"one of {', '.join(DRIVE_NAMES)}")
     return rule_control(name, machine, rig.string)
+
+
+def given_control(name: str, rig: StringRig, stiffness: float, damping: float) -> DriveControl:
+    """Return a PI law by its gains on the top's angle and speed, both negative where they brake.
+
+    Parameters
+    ----------
+    name : str
+        Of a rule of PI control.
+    rig : StringRig
+        With a top drive.
+    stiffness, damping : float
+        −Ki, N m/rad, and −Kp, N m s/rad.
+
+    Raises
+    ------
+    InputError
+        If the law has other gains, or a value is out of range.
+    """
+    machine = machine_of(rig)
+    if name not in RULES or name == "z-torque":
+        raise InputError("K1", "given", f"left out: {name} has a rule of its own")
+    for gain in (stiffness, damping):
+        if gain > 0.0:
+            raise InputError("K1", gain, "at most 0: it brakes a drive that is ahead")
+    return pi_control(machine, -damping, -stiffness, name=name)
 
 
 def machine_of(rig: Rig) -> DriveMachine:

@@ -56,6 +56,18 @@ class ExactLoop:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Return the characteristic function over its positive growth, (...)."""
+        axial, torsional, across, growth = self.parts(s)
+        # A phase is kept, a size that overflows is not.
+        return np.asarray((axial * torsional - across) * np.exp(1j * growth.imag))
+
+    def parts(
+        self, s: npt.ArrayLike
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return what vanishes where axial, and where torsional motion alone has a root, (...).
+
+        Third comes what couples them, a product from both sides, and fourth the growth that all
+        of it is over.
+        """
         at = np.asarray(s, dtype=complex)
         axial = lumped(self.string, self.string.tension)
         torsional = lumped(self.string, self.string.torsion)
@@ -70,9 +82,8 @@ class ExactLoop:
         load = response[..., 0::2] + at[..., None, None] * response[..., 1::2]
         a = weight / (axial.mass * rate**2) + x * load[..., 0, 0]
         d = torque / torsional.stiffness + theta * load[..., 1, 1]
-        found = a * d - x * theta * load[..., 0, 1] * load[..., 1, 0]
-        # A phase is kept, a size that overflows is not.
-        return np.asarray(found * np.exp(1j * (growth + growth_x).imag))
+        across = x * theta * load[..., 0, 1] * load[..., 1, 0]
+        return np.asarray(a), np.asarray(d), np.asarray(across), np.asarray(growth + growth_x)
 
     def count_right_of(self, line: float = 0.0, height: float = 200.0) -> int:
         """Return the number of roots with Re s > line, by the argument principle.
