@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from drillctrl.cli.drives import are_drives, driven_case
 from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
@@ -21,7 +22,11 @@ from drillctrl.cli.verb import Verb
 
 @click.command(name="analyze", cls=Verb)
 @point_options
-@click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
+@click.option(
+    "--structure",
+    help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, dynamic-2 …; "
+    "without it, the open loop.",
+)
 @click.option(
     "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
 )
@@ -53,14 +58,21 @@ def analyze_command(
       drillctrl analyze --structure case1 --K1 -5.17 --K2 5.06 --m 3 --order 0
       drillctrl analyze --rig table1 --speed "150 rpm" --rop "20 m/h" \\
           --structure p --K1 "-2 kN*m/rad"
+      drillctrl analyze --rig vertical-3000 --speed "120 rpm" --rop "10 m/h" \\
+          --structure soft-torque
     """
     check_outputs(out, plot)
+    tried = wants_trials(trials)
     where = read_point(point)
     from drillctrl.designs.design import analyze
 
-    scales = scales_at(where, structure)
-    gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
-    result = analyze(where, structure, *gains, m=m, order=order, trials=wants_trials(trials))
+    if structure is not None and are_drives([structure]):
+        turned = driven_case(where, structure, k1, k2, tried)
+        result = analyze(turned, m=m, order=order)
+    else:
+        scales = scales_at(where, structure)
+        gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
+        result = analyze(where, structure, *gains, m=m, order=order, trials=tried)
     deliver_roots(result, prove, as_json, out, plot)
     if require_stable and (not result.stable or result.verdict.refused):
         raise click.exceptions.Exit(NOT_STABILISED)

@@ -9,6 +9,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
+from drillctrl.cli.drives import are_drives, deliver_drives, drive_options, refuse_drive_options
 from drillctrl.cli.gains import read_bounds, read_gains, scales_at
 from drillctrl.cli.output import check_folder, json_text, writing
 from drillctrl.cli.point import point_options, read_point
@@ -41,6 +42,7 @@ ENDINGS = (".html", ".csv", ".json")
 @click.option("--sort", default="spectral_abscissa", show_default=True, help="Measure to sort by.")
 @trials_option("all")
 @click.option("--no-charts", is_flag=True, help="Leave out the stable areas.")
+@drive_options
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", metavar="FILE", help="Write a report: .html, .csv or .json.")
 def compare_command(
@@ -52,25 +54,39 @@ def compare_command(
     sort: str,
     trials: str,
     no_charts: bool,
+    plot: str | None,
+    drop: str | None,
+    decay: str | None,
     as_json: bool,
     out: str | None,
     **point: Any,
 ) -> None:
     """Compare feedback structures and given gains at one point on one set of measures.
 
+    Structures of a top drive (stiff, soft-torque, soft-torque-matched, soft-torque-fastest,
+    z-torque, dynamic-1 … dynamic-4) are compared on the string of a rig: reflection, critical
+    slope and threshold speed of each mode, margin of the delay.
+
     \b
     Examples:
       drillctrl compare --omega0 10 --delta0 12 --structures p,case1,case2 --out report.html
       drillctrl compare --given "paper=case1:-5.17:5.06" --sort stability_radius
       drillctrl compare --rig table1 --speed "150 rpm" --rop "20 m/h"
+      drillctrl compare --rig vertical-3000 --structures stiff,soft-torque,dynamic-2
     """
     check_folder("--out", out)
+    names = [name for name in (part.strip() for part in structures.split(",")) if name]
+    for_drives = {"plot": plot, "drop": drop, "decay": decay}
+    if are_drives(names):
+        deliver_drives(names, point, for_drives, as_json, out)
+        return
+    refuse_drive_options(for_drives)
     if out is not None and Path(out).suffix.lower() not in ENDINGS:
         raise InputError("--out", out, f"a file that ends in {', '.join(ENDINGS)}")
     if out is not None and Path(out).suffix.lower() == ".html":
         required("matplotlib", "figures")
     tried = wants_trials(trials)
-    where, names = read_point(point), [name.strip() for name in structures.split(",")]
+    where = read_point(point)
     candidates = [read_given(text, where) for text in given]
     from drillctrl.cli.scenario import read_numbers
     from drillctrl.drilling.structures import preset_structure
@@ -81,7 +97,7 @@ def compare_command(
     with open_progress() as progress:
         result = compare(
             where,
-            [name for name in names if name],
+            names,
             given=candidates,
             bounds=read_bounds(bound, every, scales_at(where, every)),
             disturbance=read_numbers("--initial", initial, "dx=1,dtheta=1"),

@@ -128,7 +128,7 @@ def plant_arrays(
     """
     if case.drills:
         arrays = case.linear_arrays(case.table(values, count))
-        if arrays.late:
+        if not arrays.one_delay:
             raise InputError("plant", "with signals that arrive late", "of one delay here")
         return arrays.A0, arrays.left, arrays.right, arrays.delay
     if values:

@@ -16,6 +16,7 @@ from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
 from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines, set_out
 from drillctrl.robustness.margins import ParameterMargin
+from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.synthesis.boundary import BoundaryDecision, decide
 from drillctrl.synthesis.family import loop_family
 
@@ -63,6 +64,8 @@ class Report:
         What else stabilises the point, if a design does not.
     quieter : tuple of Quieter
         With what the motion is quiet without control, where a design on it is refused.
+    modes : NamedRoots or None
+        Roots by the modes of a string of pipe, and the drive that turns it.
     """
 
     result: Analysis
@@ -71,12 +74,17 @@ class Report:
     alternative: Alternative | None
     remedies: tuple[Remedy, ...]
     quieter: tuple[Quieter, ...] = ()
+    modes: NamedRoots | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
         fields = self.result.to_dict()
         found = self.robustness
         fields["robustness"] = None if found is None else found.to_dict()
+        if self.modes is not None:
+            fields |= self.modes.to_dict()
+            if self.modes.control is not None:
+                fields["structure"] = self.modes.control.name
         if isinstance(self.result, Design):
             decision, other = self.boundary, self.alternative
             fields["certificate"]["boundary"] = decision and {
@@ -98,6 +106,8 @@ class Report:
             lines += _quieter_lines(design, self.quieter)
         else:
             lines = result_lines(design)
+        if self.modes is not None:
+            lines += self.modes.lines
         if self.robustness is not None:
             lines += _robustness_lines(design, self.robustness)
         if self.alternative is not None:
@@ -129,8 +139,9 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
     if result.structure is not None:
         at("margins")
         stands = robustness_of(result)
+    modes = named_roots(result.case, result.structure, result.K1, result.K2)
     if not isinstance(result, Design):
-        return Report(result, stands, None, None, ())
+        return Report(result, stands, None, None, (), modes)
     at("bounds")
     decision = boundary_decision(result)
     other = None
@@ -145,7 +156,7 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
     if result.on_motion is not None and result.verdict.refused:
         at("what would be quiet")
         quiet = quieter(result.case)
-    return Report(result, stands, decision, other, helps, quiet)
+    return Report(result, stands, decision, other, helps, quiet, modes)
 
 
 def boundary_decision(design: Design) -> BoundaryDecision | None:

@@ -65,11 +65,11 @@ def root_sensitivity(
     plant, _ = case.physics("the derivative of a root")
     inputs = structure.inputs if structure else ("torque",)
     open_loop = case.system(inputs)
-    if len(open_loop.delays) > 1:
-        raise InputError("plant", "with signals that arrive late", "of one delay here")
     loop = open_loop
     if structure is not None:
         loop = close_loop(open_loop, structure, np.asarray(K1), K2)
+    if len(loop.delays) > 1:
+        raise InputError("plant", "with signals that arrive late", "of one delay here")
     roots = dominant_roots(loop)
     if not 0 <= index < len(roots):
         raise InputError("index", index, f"in [0, {len(roots) - 1}]")

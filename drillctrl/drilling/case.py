@@ -147,6 +147,7 @@ class Case:
             state_names=plant.state_names,
             input_names=chosen,
             output_names=plant.output_names,
+            input_delays=tuple(values.input_delays[0, columns].tolist()),
             feedback_delay=float(values.delay[0]),
         )
 

@@ -99,9 +99,10 @@ def linearisation(plant: Plant) -> ca.Function:
     Returns
     -------
     Function
-        p → A0 (n, n), L (n, 1), R (1, n), B (n, m), C (q, n), τ0 and, for every late term, its
-        delay and matrix: X' = A0 X + L R X(t − τ0) + B u + …, Y = C X. The bit meets its own
-        past in one signal, the depth of cut, so that the delayed matrix has rank one.
+        p → A0 (n, n), L (n, 1), R (1, n), B (n, m), C (q, n), τ0, delays of the inputs (m, 1)
+        and, for every late term, its delay and matrix: X' = A0 X + L R X(t − τ0) + B u + …,
+        Y = C X. The bit meets its own past in one signal, the depth of cut, so that the delayed
+        matrix has rank one.
     """
     form = expressions(plant)
     structure = form.structure
@@ -114,6 +115,7 @@ def linearisation(plant: Plant) -> ca.Function:
         ca.densify(structure.B),
         ca.densify(structure.C),
         steady_delay(form.c),
+        ca.densify(structure.delays_of_inputs),
     ]
     for late in structure.late:
         outputs += [late.delay, ca.densify(late.matrix)]
@@ -146,6 +148,8 @@ class LinearArrays(NamedTuple):
     B, C : array, (N, n, m) and (N, q, n)
     delay : array, (N,)
         τ0.
+    input_delays : array, (N, m)
+        How late the inputs act.
     late : tuple of (delay (N,), matrix (N, n, n))
         Further delayed terms.
     """
@@ -156,7 +160,13 @@ class LinearArrays(NamedTuple):
     B: FloatArray
     C: FloatArray
     delay: FloatArray
+    input_delays: FloatArray
     late: tuple[tuple[FloatArray, FloatArray], ...]
+
+    @property
+    def one_delay(self) -> bool:
+        """Whether nothing is late but the rock's face."""
+        return not self.late and not self.input_delays.any()
 
 
 def linear_arrays(plant: Plant, table: FloatArray) -> LinearArrays:
@@ -169,9 +179,10 @@ def linear_arrays(plant: Plant, table: FloatArray) -> LinearArrays:
         rows, columns = function.size_out(i)
         full = value.full().reshape(rows, count, columns)
         values.append(np.ascontiguousarray(full.transpose(1, 0, 2)))
-    late = tuple((values[i].reshape(count), values[i + 1]) for i in range(6, len(values), 2))
-    a0, left, right, b, c, tau = values[:6]
-    return LinearArrays(a0, left, right, b, c, tau.reshape(count), late)
+    late = tuple((values[i].reshape(count), values[i + 1]) for i in range(7, len(values), 2))
+    a0, left, right, b, c, tau, inputs = values[:7]
+    delays = inputs.reshape(count, -1)
+    return LinearArrays(a0, left, right, b, c, tau.reshape(count), delays, late)
 
 
 @by_form

@@ -77,6 +77,8 @@ class MotionArrays(NamedTuple):
         Weight and torque on bit of steady drilling.
     A, E, B, T, C, R : array
         As in `Realisation`.
+    input_delays : array, (m,)
+        How late the inputs act.
     late : tuple of (float, array (n, n))
         Terms that act with a delay.
     linear : array, (n, n)
@@ -95,6 +97,7 @@ class MotionArrays(NamedTuple):
     T: FloatArray
     C: FloatArray
     R: FloatArray
+    input_delays: FloatArray
     late: tuple[tuple[float, FloatArray], ...]
     linear: FloatArray
     linear_delayed: FloatArray
@@ -108,7 +111,7 @@ def _motion_function(plant: Plant) -> ca.Function:
     own = [getattr(form.q, name) for name in plant.bit.values]
     load = ca.vertcat(*steady_load(form.bit, form.c, form.q))
     matrices = [made.A, made.E, made.B, made.T, made.C, made.R]
-    late = [value for term in made.late for value in term]
+    late = [made.delays_of_inputs, *(value for term in made.late for value in term)]
     q = ca.vertcat(*[ca.SX(value) for value in (*form.c, *own)])
     outputs = [ca.densify(ca.SX(value)) for value in (q, load, *matrices, *late)]
     return ca.Function("motion", [form.parameters], outputs)
@@ -123,7 +126,7 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
         If axial and torsional structure meet elsewhere than at the bit.
     """
     values = [value.full() for value in _motion_function(plant)(parameters)]
-    q, steady, a, e, b, t, c, r, *rest = values
+    q, steady, a, e, b, t, c, r, inputs, *rest = values
     if e[1, 1] != 0.0 or e[3, 0] != 0.0:
         raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
     late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
@@ -131,7 +134,7 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     linear = [value.full() for value in linearisation(plant)(parameters)[:3]]
     delayed = linear[1] @ linear[2][:, :BIT_STATES]
     return MotionArrays(
-        q.ravel(), steady.ravel(), a, e, b, t, c, r, late, linear[0], delayed,
+        q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear[0], delayed,
         np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]),
     )  # fmt: skip
 

@@ -6,7 +6,8 @@ moved beyond V0 t and Ω0 t: (x, x', θ, θ').
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
@@ -38,6 +39,8 @@ class Realisation:
         Of the outputs.
     late : tuple of Late
         Terms that act with a delay.
+    input_delays : mapping
+        Input → how late it acts, for those that do.
     """
 
     states: tuple[Signal, ...]
@@ -50,6 +53,12 @@ class Realisation:
     C: ca.SX
     R: ca.SX
     late: tuple[Late, ...] = ()
+    input_delays: Mapping[str, Expression] = field(default_factory=dict)
+
+    @property
+    def delays_of_inputs(self) -> ca.SX:
+        """How late each input acts, (m, 1)."""
+        return ca.vertcat(*[ca.SX(self.input_delays.get(n, 0.0)) for n in self.input_names])
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -124,6 +124,40 @@ class Lagging(Block):
         return replace(grown, A=a, B=b).with_output(grown.states[-1], measured, ca.SX(1, 4))
 
 
+class LateInput(Block):
+    """An input that acts late: what a controller asks for is there a delay later.
+
+    Parameters
+    ----------
+    input : str
+        Which.
+    delay : float
+        At least 0.
+
+    Raises
+    ------
+    InputError
+        If the delay is out of range.
+    """
+
+    def __init__(self, input: str, delay: float) -> None:
+        name = f"{input}_delay"
+        self.__dict__.update(input=input, parameters={name: 0.0}, quantities={name: "time"})
+        super().__init__(**{name: checked_number("delay", delay, 0.0, 1e9)})
+
+    @property
+    def form(self) -> Any:
+        """What is late."""
+        return LateInput, self.__dict__["input"]
+
+    def signals(self, made: Realisation, c: Coefficients, q: Any) -> Realisation:
+        """Return the equations with the input's delay."""
+        name = self.__dict__["input"]
+        _index(made.input_names, name, "input")
+        later = made.input_delays.get(name, 0.0) + getattr(q, f"{name}_delay")
+        return replace(made, input_delays={**made.input_delays, name: later})
+
+
 def _grown(made: Realisation, state: Signal) -> Realisation:
     """Return a realisation with one more state that nothing moves yet."""
     n = len(made.states)

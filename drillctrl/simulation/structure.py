@@ -106,8 +106,9 @@ def structure_of(case: Case) -> Structure:
     """
     plant, _ = case.physics("a simulation")
     arrays = case.motion()
-    if arrays.late:
-        delay = f"a signal that arrives {arrays.late[0][0]:g} late"
+    late = [delay for delay in (*arrays.input_delays, *(term[0] for term in arrays.late)) if delay]
+    if late:
+        delay = f"a signal that arrives {late[0]:g} late"
         raise InputError("plant", delay, "one without; give the controller the delay")
     return Structure(
         plant.state_names,

@@ -98,8 +98,13 @@ class RigCheck:
                 for kind, modes in (("torsional", self.torsional), ("axial", self.axial))
             },
             "sections": [_section_fields(section) for section in _sections(self.rig)],
-            "drive_inertia": getattr(self.rig, "drive_inertia", None),
+            "drive": _drive_fields(self.rig),
         }
+
+
+def _drive_fields(rig: Rig) -> dict[str, Any] | None:
+    drive = rig.drive if isinstance(rig, StringRig) else None
+    return None if drive is None else asdict(drive)
 
 
 def _section_fields(section: Any) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from drillctrl.drilling.linear import bit_response
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.lump import lumped
 from drillctrl.strings.model import PipeString
+from drillctrl.strings.winding import zeros_right_of
 
 # (s per second) → dynamic stiffness of the drive, N m/rad.
 TopStiffness = Callable[[ComplexArray], ComplexArray]
@@ -55,6 +56,18 @@ class ExactLoop:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Return the characteristic function over its positive growth, (...)."""
+        axial, torsional, across, growth = self.parts(s)
+        # A phase is kept, a size that overflows is not.
+        return np.asarray((axial * torsional - across) * np.exp(1j * growth.imag))
+
+    def parts(
+        self, s: npt.ArrayLike
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return what vanishes where axial, and where torsional motion alone has a root, (...).
+
+        Third comes what couples them, a product from both sides, and fourth the growth that all
+        of it is over.
+        """
         at = np.asarray(s, dtype=complex)
         axial = lumped(self.string, self.string.tension)
         torsional = lumped(self.string, self.string.torsion)
@@ -69,9 +82,8 @@ class ExactLoop:
         load = response[..., 0::2] + at[..., None, None] * response[..., 1::2]
         a = weight / (axial.mass * rate**2) + x * load[..., 0, 0]
         d = torque / torsional.stiffness + theta * load[..., 1, 1]
-        found = a * d - x * theta * load[..., 0, 1] * load[..., 1, 0]
-        # A phase is kept, a size that overflows is not.
-        return np.asarray(found * np.exp(1j * (growth + growth_x).imag))
+        across = x * theta * load[..., 0, 1] * load[..., 1, 0]
+        return np.asarray(a), np.asarray(d), np.asarray(across), np.asarray(growth + growth_x)
 
     def count_right_of(self, line: float = 0.0, height: float = 200.0) -> int:
         """Return the number of roots with Re s > line, by the argument principle.
@@ -88,24 +100,10 @@ class ExactLoop:
         InputError
             If a root lies on the contour.
         """
-        reach = height
         # The phase turns by about the delays that waves and blades take, per unit of height.
         lines = (self.string.torsion, self.string.tension)
         turning = self.delay + 2.0 * self.rate * sum(line.transit_time for line in lines)
-        count = int(8.0 * (1.0 + reach * turning))
-        side = line + 1j * np.linspace(-reach, reach, count)
-        arc = line + reach * np.exp(1j * np.linspace(0.5, -0.5, count) * np.pi)
-        path = np.concatenate([side, arc[1:]])
-        values = self(path)
-        for _ in range(40):
-            turned = np.angle(values[1:] / values[:-1])
-            coarse = np.nonzero(np.abs(turned) > 0.4)[0]
-            if not coarse.size:
-                return -round(float(turned.sum()) / (2.0 * np.pi))
-            between = 0.5 * (path[coarse] + path[coarse + 1])
-            path = np.insert(path, coarse + 1, between)
-            values = np.insert(values, coarse + 1, self(between))
-        raise InputError("line", line, "one on which no root lies")
+        return zeros_right_of(self, line, height, int(8.0 * (1.0 + height * turning)))
 
     def root(self, near: complex) -> complex:
         """Return the root that Newton's method finds from a starting point.

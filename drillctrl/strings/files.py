@@ -18,6 +18,7 @@ from drillctrl.drilling.rig import PRESETS as LUMPED_PRESETS
 from drillctrl.drilling.rig import Rig, read_toml, rig_from_mapping, table1
 from drillctrl.strings.catalogue import pipe
 from drillctrl.strings.drill_string import Damping, DrillString
+from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.presets import PRESETS as STRING_PRESETS
 from drillctrl.strings.presets import string_preset
 from drillctrl.strings.rig import StringRig, string_rig
@@ -45,6 +46,8 @@ _PARTS: dict[str, dict[str, Dimension | None]] = {
         "torque_limit": units.TORQUE,
         "delay": units.TIME,
         "lag": units.TIME,
+        "encoder": units.TIME,
+        "torque_filter": units.TIME,
     },
     "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
     "mud": {"density": units.DENSITY},
@@ -52,7 +55,10 @@ _PARTS: dict[str, dict[str, Dimension | None]] = {
 }
 # What may be left out: whole tables, and keys of tables.
 _OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
-_OPTIONAL = ("torque_limit", "delay", "lag", "torsional", "axial", "kelvin_voigt")
+_OPTIONAL = (
+    *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
+    *("torsional", "axial", "kelvin_voigt"),
+)
 # Numbers in the unit that the format names.
 _BARE = ("blades", "torsional", "axial", "kelvin_voigt")
 _COLUMNS: dict[str, Dimension | None] = {
@@ -131,11 +137,6 @@ def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
     if diameter > _WIDEST:
         wanted = f"at most {_WIDEST:g} m: no hole is wider"
         raise InputError(f"bit.diameter in {path}", data["bit"]["diameter"], wanted)
-    for name in ("torque_limit", "delay", "lag"):
-        # Wrong in silence otherwise: a design would know nothing of it.
-        if drive.get(name):
-            wanted = "left out: drives have an inertia and nothing else so far"
-            raise InputError(f"top_drive.{name} in {path}", data["top_drive"][name], wanted)
     given = found["damping"]
     damping = Damping(**{
         name: checked_number(f"damping.{key} in {path}", given[key], 0.0, 1e3)
@@ -146,7 +147,7 @@ def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
     mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
     return string_rig(
         DrillString(_sections(data["sections"], path), damping, mud, ropes),
-        drive_inertia=drive.get("inertia"),
+        drive=DriveMachine(**drive) if drive else None,
         bit_radius=0.5 * diameter,
         bit_geometry=bit.pop("geometry"),
         rock_strength=rock["strength"],

@@ -100,10 +100,10 @@ class Line:
         s : complex, (...)
             1/s.
         """
-        matrix, exponent = self._scaled(np.asarray(s, dtype=complex))
+        matrix, exponent = self.scaled_transfer(np.asarray(s, dtype=complex))
         return np.asarray(matrix * np.exp(exponent)[..., None, None])
 
-    def _scaled(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    def scaled_transfer(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the transfer matrix without its growth, and the exponent of that."""
         eye = np.broadcast_to(np.eye(2, dtype=complex), (*s.shape, 2, 2))
         whole, exponent = eye, np.zeros_like(s)
@@ -131,7 +131,7 @@ class Line:
         top : complex, (...)
             Dynamic stiffness of what holds the top end; infinite where its motion is imposed.
         """
-        matrix, exponent = self._scaled(np.asarray(s, dtype=complex))
+        matrix, exponent = self.scaled_transfer(np.asarray(s, dtype=complex))
         held = np.asarray(top, dtype=complex)
         free = np.isfinite(held)
         u, f = np.where(free, 1.0, 0.0), np.where(free, held, 1.0)
@@ -152,7 +152,7 @@ class Line:
 
         Forces on the line (bit, top) per displacements (bit, top); it is symmetric.
         """
-        matrix, exponent = self._scaled(np.asarray(s, dtype=complex))
+        matrix, exponent = self.scaled_transfer(np.asarray(s, dtype=complex))
         b = matrix[..., 0, 1]
         across = -np.exp(-exponent) / b
         rows = [[matrix[..., 1, 1] / b, across], [across, matrix[..., 0, 0] / b]]

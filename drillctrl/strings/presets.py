@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from drillctrl.strings.catalogue import INCH, pipe
 from drillctrl.strings.drill_string import Damping, DrillString
+from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.rig import StringRig, string_rig
 from drillctrl.strings.section import Material, Section
 
 PRESETS = ("paper-string", "vertical-3000", "deep-5000")
 
-_ROCK = {
+_ROCK: dict[str, Any] = {
     "rock_strength": 60e6,
     "contact_strength": 60e6,
     "wearflat_length": 1.2e-3,
@@ -55,7 +58,7 @@ def vertical_3000() -> StringRig:
     )
     string = DrillString(sections, mud_density=1198.0)
     return string_rig(
-        string, drive_inertia=2900.0, bit_radius=0.5 * 12.25 * INCH, blades=6, **_ROCK
+        string, drive=DriveMachine(2900.0), bit_radius=0.5 * 12.25 * INCH, blades=6, **_ROCK
     )
 
 
@@ -67,7 +70,9 @@ def deep_5000() -> StringRig:
         Section("collars", "collar", 94.4, 6.75 * INCH, 2.8125 * INCH),
     )
     string = DrillString(sections, mud_density=1438.0)
-    return string_rig(string, drive_inertia=2900.0, bit_radius=0.5 * 8.5 * INCH, blades=5, **_ROCK)
+    return string_rig(
+        string, drive=DriveMachine(2900.0), bit_radius=0.5 * 8.5 * INCH, blades=5, **_ROCK
+    )
 
 
 def _joints(name: str, kind: str, count: int) -> Section:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.block import Block
 from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.rig import Rig
+from drillctrl.drilling.sensors import Lagging, LateInput
 from drillctrl.strings.drill_string import DrillString
+from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.lump import lumped
 from drillctrl.strings.model import PipeString
 
@@ -34,8 +37,8 @@ class StringRig(Rig):
     ----------
     string : DrillString
         What hangs between top end and bit.
-    drive_inertia : float or None
-        Of the top drive, referred to the string, kg m²; None where the speed is imposed.
+    drive : DriveMachine or None
+        The top drive; None where the speed is imposed.
 
     Raises
     ------
@@ -44,23 +47,30 @@ class StringRig(Rig):
     """
 
     string: DrillString = field(kw_only=True)
-    drive_inertia: float | None = field(default=None, kw_only=True)
+    drive: DriveMachine | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.drive_inertia is not None:
-            checked_number("inertia of the drive", self.drive_inertia, 0.0, 1e9, open_low=True)
         for name, value in lumped_values(self.string).items():
             if abs(getattr(self, name) - value) > 1e-9 * abs(value):
                 wanted = f"{value:.10g}, which follows from the string"
                 raise InputError(name, getattr(self, name), wanted)
 
     def hardware(self) -> dict[str, Any]:
-        """Return string and drive as parts of a plant."""
+        """Return string and drive as parts of a plant.
+
+        The drive's torque lags and is late as the machine says; its measurements are as they
+        are, filters being part of a law.
+        """
         parts: dict[str, Any] = {"string": PipeString(self.string)}
-        if self.drive_inertia is not None:
-            ratio = self.drive_inertia / self.inertia
-            parts["blocks"] = (TopDrive(inertia_ratio=ratio),)
+        machine = self.drive
+        if machine is not None:
+            blocks: list[Block] = [TopDrive(inertia_ratio=machine.inertia / self.inertia)]
+            if machine.lag:
+                blocks.append(Lagging("drive", machine.lag / self.time_scale))
+            if machine.delay:
+                blocks.append(LateInput("drive", machine.delay / self.time_scale))
+            parts["blocks"] = tuple(blocks)
         return parts
 
 
@@ -80,7 +90,7 @@ def lumped_values(string: DrillString) -> dict[str, float]:
 
 
 def string_rig(
-    string: DrillString, *, drive_inertia: float | None = None, **bit_and_rock: Any
+    string: DrillString, *, drive: DriveMachine | None = None, **bit_and_rock: Any
 ) -> StringRig:
     """Return a rig with a real string.
 
@@ -88,13 +98,13 @@ def string_rig(
     ----------
     string : DrillString
         The string.
-    drive_inertia : float, optional
-        Of the top drive, kg m².
+    drive : DriveMachine, optional
+        The top drive.
     **bit_and_rock
         The attributes of `Rig` that say what bit and rock are.
     """
     values: dict[str, Any] = {**lumped_values(string), **bit_and_rock}
-    return StringRig(**values, string=string, drive_inertia=drive_inertia)
+    return StringRig(**values, string=string, drive=drive)
 
 
 def lump(rig: Rig) -> Rig:

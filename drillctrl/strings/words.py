@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from drillctrl.drilling.rig import STANDARD_GRAVITY
 from drillctrl.strings.check import Mode, RigCheck
+from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.rig import StringRig, lump
 from drillctrl.strings.section import Section
 
@@ -51,11 +52,19 @@ def rig_summary(found: RigCheck) -> str:
 
 
 def _top_end(rig: StringRig) -> str:
-    drive = rig.drive_inertia
-    turned = "speed imposed" if drive is None else f"top drive of {drive:g} kg·m² at the string"
+    turned = "speed imposed" if rig.drive is None else drive_text(rig.drive)
     ropes = rig.string.hoisting_stiffness
     fed = "feed imposed" if ropes is None else f"ropes of {ropes / 1e3:.5g} kN/m"
     return f"{turned}, {fed}"
+
+
+def drive_text(drive: DriveMachine) -> str:
+    """Return what a drive is."""
+    told = f"top drive of {drive.inertia:g} kg·m² at the string"
+    if drive.torque_limit is not None:
+        told += f", at most {drive.torque_limit / 1e3:.4g} kN·m"
+    times = (("delay", drive.delay), ("lag", drive.lag), ("encoder", drive.encoder))
+    return told + "".join(f", {name} {1e3 * time:.3g} ms" for name, time in times if time)
 
 
 def _section_text(section: Section) -> str:

@@ -116,7 +116,7 @@ def test_parameter_sensitivity_matches_differences(point):
     p = as_case(point).parameter_vector
 
     def stacked(vector):
-        a0, left, right, b, _, tau, _ = linear_arrays(plant, vector[None, :])
+        a0, left, right, b, _, tau, *_ = linear_arrays(plant, vector[None, :])
         matrices = (a0[0], left[0] @ right[0], b[0])
         return np.concatenate([*(m.ravel(order="F") for m in matrices), tau])
 

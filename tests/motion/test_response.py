@@ -193,7 +193,7 @@ def test_modes_of_a_string_with_a_drive_are_those_of_its_linear_system():
 
 
 def test_modes_of_a_string_are_those_of_its_pipes():
-    rig = replace(string_preset("vertical-3000"), drive_inertia=None)
+    rig = replace(string_preset("vertical-3000"), drive=None)
     pipes = check_rig(rig).torsional[:3]
     found = torsional_modes(RigPoint(rig, 12.0, 0.005), 3)
     frequencies = [mode.root.imag / rig.time_scale / (2.0 * math.pi) for mode in found]

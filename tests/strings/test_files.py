@@ -2,7 +2,7 @@
 
 import pytest
 
-from drillctrl import InputError, load_rig, read_tally, string_preset
+from drillctrl import DriveMachine, InputError, load_rig, read_tally, string_preset
 
 BIT = """
 [bit]
@@ -61,9 +61,14 @@ def test_sections_in_the_file(tmp_path):
     assert rig.string.mud_density == pytest.approx(1198.26, abs=0.01)
     assert rig.string.damping.torsional == 0.2
     assert rig.bit_radius == pytest.approx(0.10795)
-    assert rig.drive_inertia is None
+    assert rig.drive is None
     driven = load_rig(written(tmp_path, text + TOP_DRIVE))
-    assert driven.drive_inertia == 2900.0
+    assert driven.drive == DriveMachine(2900.0)
+    whole = (
+        TOP_DRIVE + 'torque_limit = "60 kN*m"\ndelay = "20 ms"\nlag = "5 ms"\nencoder = "2 ms"\n'
+    )
+    machine = load_rig(written(tmp_path, text + whole)).drive
+    assert machine == DriveMachine(2900.0, 60e3, 0.02, 0.005, 0.002)
 
 
 def test_a_tally_beside_the_file(tmp_path):
@@ -98,8 +103,20 @@ def test_presets_are_rigs_too():
         (('strength = "60 MPa"\ncontact', "contact"), "strength in"),
         (("[[sections]]", "[[section]]"), "key in"),
         (
-            ("[mud]", '[top_drive]\ninertia = "2900 kg*m^2"\ndelay = "20 ms"\n[mud]'),
+            ("[mud]", '[top_drive]\ninertia = "2900 kg*m^2"\ndelay = "20 m"\n[mud]'),
             "top_drive.delay",
+        ),
+        (
+            ("[mud]", '[top_drive]\ninertia = "2900 kg*m^2"\ndelay = "-20 ms"\n[mud]'),
+            "delay of the drive",
+        ),
+        (
+            ("[mud]", '[top_drive]\ninertia = "2900 kg*m^2"\nlagg = "20 ms"\n[mud]'),
+            "did you mean lag?",
+        ),
+        (
+            ("[mud]", '[top_drive]\ndelay = "20 ms"\n[mud]'),
+            "inertia in [top_drive]",
         ),
         (("torsional = 0.2", "torsional = -0.2"), "damping.torsional"),
         (("torsional = 0.2", 'torsional = "0.2 s"'), "damping.torsional"),

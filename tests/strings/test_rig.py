@@ -1,9 +1,24 @@
 """Strings in the plant: lumped, reduced and exact."""
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 
-from drillctrl import InputError, OperatingPoint, RigPoint, characteristic_roots, count_right_of
+from drillctrl import (
+    DriveMachine,
+    InputError,
+    OperatingPoint,
+    RigPoint,
+    characteristic_roots,
+    close_loop,
+    count_right_of,
+    simulate,
+    soft_torque,
+    soft_torque_control,
+    spectral_abscissas,
+)
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.rig import table1
@@ -13,6 +28,7 @@ from drillctrl.strings.model import PipeString
 from drillctrl.strings.presets import PRESETS, paper_string, string_preset
 from drillctrl.strings.rig import lump
 from drillctrl.strings.section import Section
+from tests.strings.finite_drive import root_near
 
 RPM, M_PER_H = np.pi / 30.0, 1.0 / 3600.0
 
@@ -94,3 +110,28 @@ def test_pipe_by_name():
 def test_a_bore_wider_than_the_pipe_is_refused():
     with pytest.raises(InputError, match="ID of pipe"):
         Section("pipe", "pipe", 1000.0, 0.108, 0.127)
+
+
+def test_a_late_drive_has_the_roots_of_the_exact_string():
+    """PI control through a lag and a delay, on the plant and by transfer matrices."""
+    machine = DriveMachine(2900.0, 60e3, delay=0.05, lag=0.02)
+    rig = dataclasses.replace(string_preset("vertical-3000"), drive=machine)
+    case = as_case(RigPoint(rig, 4.0 * math.pi, 10 / 3600))
+    law = soft_torque_control(machine, rig.string.torsion.wave_impedance, 0.2)
+    kp, ki = law.speed.numerator
+    gains = [-ki / rig.torsional_stiffness, -kp / (rig.torsional_stiffness * rig.time_scale)]
+    system = case.system(("drive",))
+    assert system.input_delays == (pytest.approx(0.05 / rig.time_scale),)
+    loop = close_loop(system, soft_torque(), gains)
+    exact = exact_loop(case, lambda s: s * law.impedance(s))
+    roots = [-0.07 + 0.88j, -0.15 + 1.3j, -0.05 + 3.51j, -0.14 + 5.06j, -0.05 + 6.37j]
+    for near in roots:
+        root = exact.root(near)
+        assert abs(root - near) < 0.02
+        assert root_near(loop, near) == pytest.approx(root, rel=1e-4)
+    for refused in (
+        lambda: spectral_abscissas(case, {"psi": [14.0]}, soft_torque(), gains),
+        lambda: simulate(case, duration=1.0),
+    ):
+        with pytest.raises(InputError, match="late"):
+            refused()

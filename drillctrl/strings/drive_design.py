@@ -1,0 +1,368 @@
+"""Dynamic output feedback of a top drive, designed to let the bit's torque fall most steeply.
+
+The law brakes by the top's speed and angle and drives by the pipe's torque, with N states:
+
+    A(s) = h + k/s + a(s)/e(s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
+
+e in factors of first and second order that are damped. What is maximised is the smallest
+critical slope over the first modes, over shorter and longer strings and a later drive too. It
+is nonsmooth, as the largest real part of roots is, and BFGS descends it as it does that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.errors import checked_integer, checked_number
+from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
+from drillctrl.strings.line import Line
+from drillctrl.strings.slopes import lowest_impedance, mode_bands
+from drillctrl.synthesis.descent import bfgs
+from drillctrl.synthesis.search import spread_points
+
+MODES = 4
+# Speed gains in units of ζ, torque gains as such; corners in units of the speed that scales s.
+_SPEED_GAIN, _INTEGRAL, _TORQUE_GAIN = 100.0, 200.0, 30.0
+_CORNER, _DAMPING = (0.1, 30.0), (0.2, 1.5)
+# A swing of the top of 10 rpm must not take more than the torque limit.
+_SMALLEST_SWING = 10.0 * math.pi / 30.0
+# Higher modes keep this share of what they stand under a held top.
+_KEPT = 0.5
+_LATER = 1.5
+_PER_MODE, _BEYOND = 80.0, 3.0
+_GROWTH = 1e-3
+# Above those frequencies up to this one in Hz: how many, and samples of the string for each.
+_HIGHEST, _FAR, _WITHIN, _ALONE = 60.0, 60, 40, 80
+_FEWER = 4
+_LOOKED, _BEGUN, _STEPS = 48, 3, 220
+_CHANGE = 1e-6
+
+
+class _Loop(NamedTuple):
+    """One string and one drive at the frequencies that are looked at.
+
+    Attributes
+    ----------
+    s : array, (q,)
+        iω.
+    matrix : array, (q, 2, 2)
+        The string's transfer matrix there.
+    drive : _Drive
+        The drive there.
+    weights : array, (q,)
+        By which a critical slope there counts.
+    near, echo : _Drive and array, (r,)
+        The drive a little right of the axis, from the real axis on, and what the string with a
+        free bit returns there of a wave from the top.
+    far, loudest : _Drive and array, (p,)
+        The drive above these frequencies, and the most that the string returns around there.
+    alone : _Drive
+        The drive from the real axis to where it is its inertia and nothing else.
+    """
+
+    s: ComplexArray
+    matrix: ComplexArray
+    drive: _Drive
+    weights: FloatArray
+    near: _Drive
+    echo: ComplexArray
+    far: _Drive
+    loudest: FloatArray
+    alone: _Drive
+
+
+class _Drive(NamedTuple):
+    """A machine at some s: J s, and what its path and filters make of gains on speed and torque."""
+
+    inertia: ComplexArray
+    speed: ComplexArray
+    torque: ComplexArray
+    x: ComplexArray
+
+    def pick(self, where: slice) -> _Drive:
+        """Return the drive at some of these s."""
+        return _Drive(*(values[where] for values in self))
+
+
+class _Family:
+    """Laws of one order by a vector of numbers in a box; x is s over a rate.
+
+    The vector: h, k, g; for an odd order the logarithm of a corner c and the parts of it in A
+    and B, each over x/c + 1; for every further two states the logarithm of c, the damping z and
+    two parts each, over (x/c)² + 2 z x/c + 1.
+    """
+
+    def __init__(self, order: int, pipe: float, rate: float, machine: DriveMachine) -> None:
+        self.order, self.pipe, self.rate = order, pipe, rate
+        largest = _SPEED_GAIN
+        if machine.torque_limit is not None:
+            largest = min(largest, machine.torque_limit / (_SMALLEST_SWING * pipe))
+        corner = (math.log(_CORNER[0]), math.log(_CORNER[1]))
+        speed, torque = (-_SPEED_GAIN, _SPEED_GAIN), (-_TORQUE_GAIN, _TORQUE_GAIN)
+        rows = [(0.0, largest), (0.02, _INTEGRAL), (0.0, _TORQUE_GAIN)]
+        rows += [corner, speed, torque] * (order % 2)
+        rows += [corner, _DAMPING, speed, speed, torque, torque] * (order // 2)
+        self.lower, self.upper = np.array(rows).T
+
+    def starts(self, known: FloatArray) -> FloatArray:
+        """Return numbers that begin descents, (q, k): laws with fewer states, and around them."""
+        more = self.lower.size - known.shape[1]
+        corner = math.log(3.0 + 1.5 * self.order)
+        fresh = np.array([corner, 0.0, 0.0] if more == 3 else [corner, 0.8, *[0.0] * 4])
+        begun = np.hstack([known, np.tile(fresh[:more], (len(known), 1))])
+        cube = spread_points(_LOOKED, self.lower.size, 0) - 0.5
+        spread = begun[-1] + cube * (0.5 * np.abs(begun[-1]) + 0.02 * (self.upper - self.lower))
+        inset = 1e-3 * (self.upper - self.lower)
+        whole = np.vstack([begun, spread])
+        return np.asarray(np.clip(whole, self.lower + inset, self.upper - inset))
+
+    def _sections(self, numbers: FloatArray) -> list[tuple[list[float], list[float], list[float]]]:
+        """Return denominators with their numerators in A and B, coefficients of x."""
+        found, at = [], 3
+        if self.order % 2:
+            corner, a, b = numbers[at : at + 3].tolist()
+            found.append(([math.exp(-corner), 1.0], [a], [b]))
+            at += 3
+        for corner, damping, a1, a0, b1, b0 in numbers[at:].reshape(-1, 6).tolist():
+            c = math.exp(-corner)
+            found.append(([c * c, 2.0 * damping * c, 1.0], [a1 * c, a0], [b1 * c, b0]))
+        return found
+
+    def ends(self, numbers: FloatArray, drive: _Drive) -> tuple[ComplexArray, ComplexArray]:
+        """Return what `DriveControl.ends` does, quickly."""
+        x = drive.x
+        speed, torque = numbers[0] + numbers[1] / x, np.asarray(numbers[2], dtype=complex)
+        for below, a, b in self._sections(numbers):
+            under = 1.0 / _value(below, x)
+            speed = speed + _value(a, x) * under
+            torque = torque + _value(b, x) * under
+        return 1.0 + drive.torque * torque, drive.inertia + drive.speed * speed
+
+    def laws(self, numbers: FloatArray) -> tuple[Transfer, Transfer]:
+        """Return A and B."""
+        speed = (np.array([numbers[0], numbers[1]]), np.array([1.0, 0.0]))
+        torque = (np.array([numbers[2]]), np.ones(1))
+        for below, a, b in self._sections(numbers):
+            speed, torque = _sum(speed, a, below), _sum(torque, b, below)
+        return self._transfer(self.pipe * speed[0], speed[1]), self._transfer(*torque)
+
+    def _transfer(self, above: FloatArray, below: FloatArray) -> Transfer:
+        """Return a function of s from coefficients of x."""
+        powers = self.rate ** -np.arange(below.size - 1.0, -1.0, -1.0)
+        scale = below[0] * powers[0]
+        above = np.append(np.zeros(below.size - above.size), above)
+        return Transfer(tuple(above * powers / scale), tuple(below * powers / scale))
+
+
+def _value(coefficients: list[float], x: ComplexArray) -> ComplexArray:
+    if len(coefficients) == 1:
+        return np.asarray(coefficients[0], dtype=complex)
+    found = coefficients[0] * x + coefficients[1]
+    return found if len(coefficients) == 2 else found * x + coefficients[2]
+
+
+def _sum(
+    whole: tuple[FloatArray, FloatArray], above: list[float], below: list[float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return a sum of two rational functions."""
+    top = np.polyadd(np.convolve(whole[0], below), np.convolve(whole[1], above))
+    return np.asarray(top), np.convolve(whole[1], below)
+
+
+class _Slopes:
+    """Minus the smallest weighted critical slope over all loops, and its gradient."""
+
+    def __init__(self, family: _Family, loops: list[_Loop]) -> None:
+        self.family, self.loops = family, loops
+
+    def value(self, numbers: FloatArray) -> tuple[float, int, int]:
+        """Return the slope, and the loop and the sample before the crossing that decide it.
+
+        Where a root grows without any slope it is minus infinity.
+        """
+        best = (np.inf, 0, 0)
+        for i, loop in enumerate(self.loops):
+            if self._grows(numbers, loop):
+                return -np.inf, i, 0
+            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive)
+            up = np.nonzero((z.imag[:-1] < 0.0) & (z.imag[1:] >= 0.0))[0]
+            if not up.size:
+                continue
+            share = -z.imag[up] / (z.imag[up + 1] - z.imag[up])
+            slopes = z.real[up] + share * (z.real[up + 1] - z.real[up])
+            counted = slopes * loop.weights[up]
+            least = int(np.argmin(counted))
+            if counted[least] < best[0]:
+                best = float(counted[least]), i, int(up[least])
+        return best
+
+    def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
+        """Return the value to minimise and its gradient; infinite where a root grows."""
+        value, i, at = self.value(numbers)
+        if not np.isfinite(value):
+            return np.inf, np.zeros(numbers.size)
+        loop, here, pipe = self.loops[i], slice(at, at + 2), self.family.pipe
+        s, matrix, drive = loop.s[here], loop.matrix[here], loop.drive.pick(here)
+
+        def crossing(moved: FloatArray) -> float:
+            z = self._impedance(moved, s, matrix, drive)
+            share = -z.imag[0] / (z.imag[1] - z.imag[0])
+            return float(z.real[0] + share * (z.real[1] - z.real[0]))
+
+        known = crossing(numbers)
+        steps = _CHANGE * np.eye(numbers.size)
+        slope = np.array([crossing(numbers + step) - known for step in steps]) / _CHANGE
+        return -value / pipe, -slope * loop.weights[at] / pipe
+
+    def _impedance(
+        self, numbers: FloatArray, s: ComplexArray, matrix: ComplexArray, drive: _Drive
+    ) -> ComplexArray:
+        """Return the impedance that the bit sees."""
+        speed, torque = self.family.ends(numbers, drive)
+        force = s * torque
+        moment = matrix[:, 1, 0] * speed + matrix[:, 1, 1] * force
+        return np.asarray(moment / ((matrix[:, 0, 0] * speed + matrix[:, 0, 1] * force) * s))
+
+    def _grows(self, numbers: FloatArray, loop: _Loop) -> bool:
+        """Whether a root of string and drive grows, or might above the frequencies looked at.
+
+        The characteristic function is N + ζ D, the drive on an endless pipe, times 1 − r E with
+        the drive's reflection r and the string's echo E, times what has no zeros there.
+        """
+        pipe = self.family.pipe
+
+        def parts(drive: _Drive) -> tuple[ComplexArray, ComplexArray]:
+            speed, torque = self.family.ends(numbers, drive)
+            whole = torque + pipe * speed
+            return whole, (torque - pipe * speed) / whole
+
+        # Above, no more comes back than a wave loses on its way.
+        if (np.abs(parts(loop.far)[1]) * loop.loudest >= 1.0).any():
+            return True
+        whole = parts(loop.alone)[0] / (loop.alone.inertia + pipe)
+        returned = 1.0 - parts(loop.near)[1] * loop.echo
+        return bool(_turns(whole) or _turns(returned))
+
+
+def _turns(values: ComplexArray) -> bool:
+    """Whether a function turns about 0 on its way from a real value to its last one."""
+    turned = np.angle(values[1:] / values[:-1]).sum() + np.angle(values[0])
+    return bool(abs(turned - np.angle(values[-1])) > 1.0)
+
+
+def stretched(line: Line, factor: float) -> Line:
+    """Return the string as much longer as a factor says, all of it in its longest stretch."""
+    lengths = [stretch.length for stretch in line.stretches]
+    longest = int(np.argmax(lengths))
+    share = 1.0 + (factor - 1.0) * sum(lengths) / lengths[longest]
+    stretch = line.stretches[longest]
+    repeats = max(1, round(stretch.repeats * max(share, 0.1)))
+    rest = max(share, 0.1) * stretch.repeats / repeats
+    pieces = tuple(piece._replace(length=piece.length * rest) for piece in stretch.pieces)
+    others = list(line.stretches)
+    others[longest] = stretch._replace(pieces=pieces, repeats=repeats)
+    return Line(tuple(others))
+
+
+def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
+    modes, ends = mode_bands(line, MODES)
+    step = float(modes[0]) / _PER_MODE
+    fine = np.arange(step, ends[-1], step)
+    coarse = np.arange(ends[-1], _BEYOND * ends[-1], 2.0 * step)
+    frequencies = np.concatenate([fine, coarse])
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+    matrix, _ = line.scaled_transfer(s)
+    # Under a held top, by the same samples.
+    held = matrix[:, 1, 1] / (matrix[:, 0, 1] * s)
+    up = np.nonzero((held.imag[:-1] < 0.0) & (held.imag[1:] >= 0.0))[0]
+    stand = np.interp(frequencies, frequencies[up], held.real[up])
+    weights = np.where(frequencies <= ends[-1], 1.0, aim / np.maximum(_KEPT * stand, 1e-3 * aim))
+    pipe = line.wave_impedance
+
+    def right_of(hertz: FloatArray) -> ComplexArray:
+        return np.asarray(_GROWTH + 2j * np.pi * hertz, dtype=complex)
+
+    def echo(at: ComplexArray) -> ComplexArray:
+        there, _ = line.scaled_transfer(at)
+        moment, angle = there[:, 1, 0], pipe * there[:, 1, 1] * at
+        return np.asarray((moment - angle) / (moment + angle))
+
+    # An echo turns slowly: fewer will do.
+    near = right_of(np.concatenate([np.linspace(0.0, step, 10)[:-1], frequencies[::_FEWER]]))
+    edges = np.geomspace(frequencies[-1], _HIGHEST, _FAR + 1)
+    within = np.linspace(edges[:-1], edges[1:], _WITHIN, axis=1)
+    loudest = np.abs(echo(right_of(within.ravel()))).reshape(within.shape).max(axis=1)
+    alone = right_of(np.append(0.0, np.geomspace(1e-3, _HIGHEST, _ALONE)))
+    drives = [_drive(machine, pipe, rate, at) for at in (s, near, right_of(edges[1:]), alone)]
+    return _Loop(
+        s, matrix, drives[0], weights, drives[1], echo(near), drives[2], loudest, drives[3]
+    )
+
+
+def _drive(machine: DriveMachine, pipe: float, rate: float, s: ComplexArray) -> _Drive:
+    plain = DriveControl("path", machine, Transfer((pipe,)), Transfer((1.0,)))
+    path, (speed, torque) = plain.path(s), plain.laws(s)
+    return _Drive(machine.inertia * s, path * speed, path * torque, s / rate)
+
+
+def dynamic_drive_control(
+    line: Line,
+    machine: DriveMachine,
+    order: int = 2,
+    length_error: float = 0.2,
+) -> DriveControl:
+    """Design dynamic feedback for the largest smallest critical slope of the first four modes.
+
+    Parameters
+    ----------
+    line : Line
+        The string in torsion.
+    machine : DriveMachine
+        The drive. Its torque limit bounds the gain on speed: a swing of 10 rpm must not take more.
+    order : int
+        Number of states beside the integrator of speed and the filters of the machine, 0 to 4.
+    length_error : float
+        The design holds for strings that are shorter and longer by that share, and for a drive
+        whose delay is half as long again.
+
+    Returns
+    -------
+    DriveControl
+        ``dynamic-N``, the best that was found; no order does worse than one of two states less.
+    """
+    n = checked_integer("order", order, 0, 4)
+    error = checked_number("length_error", length_error, 0.0, 0.5)
+    modes, _ = mode_bands(line, MODES)
+    rate = 2.0 * math.pi * math.sqrt(float(modes[0] * modes[-1]))
+    aim = 0.5 * lowest_impedance(line)
+    lengths = (line, *(stretched(line, 1.0 + sign * error) for sign in (-1, 1) if error))
+    loops = [_loop(each, machine, aim, rate) for each in lengths]
+    if machine.delay > 0.0:
+        later = replace(machine, delay=_LATER * machine.delay)
+        loops.append(_loop(line, later, aim, rate))
+    known = np.array([[4.0, 1.0, 0.0], [30.0, 3.0, 4.0], [40.0, 7.0, 9.0]])
+    for grown in range(n % 2, n + 1, 2):
+        family = _Family(grown, line.wave_impedance, rate, machine)
+        known = _best(family, _Slopes(family, loops), known)[None, :]
+    return DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
+
+
+def _best(family: _Family, goal: _Slopes, known: FloatArray) -> FloatArray:
+    """Return the best numbers that descents from laws with fewer states find."""
+    starts = family.starts(known)
+    values = -np.array([goal.value(start)[0] for start in starts])
+    # The known ones first, whatever they are worth.
+    order = [*range(len(known)), *(len(known) + np.argsort(values[len(known) :]))]
+    chosen = [i for i in order if np.isfinite(values[i])][:_BEGUN]
+    ends = [bfgs(goal, starts[i], family.lower, family.upper, most=_STEPS) for i in chosen]
+    best = min(ends, key=lambda end: end.value)
+    # Learned curvature misleads once other crossings decide: begin again from the best end.
+    inset = 1e-6 * (family.upper - family.lower)
+    start = np.clip(best.gains, family.lower + inset, family.upper - inset)
+    again = bfgs(goal, start, family.lower, family.upper, most=_STEPS)
+    return min(best, again, key=lambda end: end.value).gains

@@ -1,0 +1,189 @@
+"""Drives of one string side by side: what each returns, stands and leaves in reserve."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from drillctrl.base.errors import InputError
+from drillctrl.base.tableio import csv_text
+from drillctrl.drilling.rig import Rig
+from drillctrl.strings.drive_control import DriveControl, DriveMachine
+from drillctrl.strings.drive_design import dynamic_drive_control
+from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
+from drillctrl.strings.drive_rules import RULES, pi_control, rule_control
+from drillctrl.strings.drives_words import comparison_summary
+from drillctrl.strings.falling import FallingTorque
+from drillctrl.strings.rig import StringRig
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DYNAMIC = tuple(f"dynamic-{n}" for n in range(5))
+DRIVE_NAMES = (*RULES, *_DYNAMIC)
+_MODES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class DriveComparison:
+    """Drives of one string side by side.
+
+    Attributes
+    ----------
+    rig : StringRig
+        The string and its drive.
+    falling : FallingTorque
+        What threshold speeds are for.
+    drives : tuple of DriveMeasures
+        In the order asked for.
+    elapsed_seconds : float
+        Wall time.
+    """
+
+    rig: StringRig
+    falling: FallingTorque
+    drives: tuple[DriveMeasures, ...]
+    elapsed_seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of the command line."""
+        machine = self.rig.drive
+        assert machine is not None
+        return {
+            "schema": "drillctrl/drives/1",
+            "length": self.rig.string.length,
+            "impedance": self.rig.string.torsion.wave_impedance,
+            "top_drive": asdict(machine),
+            "falling_torque": asdict(self.falling),
+            "drives": [drive.to_dict() for drive in self.drives],
+            "elapsed_seconds": self.elapsed_seconds,
+        }
+
+    def to_csv(self) -> str:
+        """Return a row for each mode of each drive."""
+        rows = [
+            {
+                "structure": drive.control.name,
+                "stable": drive.stable,
+                "delay_margin": drive.delay_margin,
+                **mode.to_dict(),
+            }
+            for drive in self.drives
+            for mode in drive.modes
+        ]
+        return csv_text(list(rows[0]), ([str(v) for v in row.values()] for row in rows))
+
+    def summary(self) -> str:
+        """Return a table for people."""
+        return comparison_summary(self.rig, self.falling, self.drives)
+
+    def plot(self) -> Figure:
+        """Draw |r|, impedance, and damping over frequency; see `plot_drives`."""
+        from drillctrl.strings.drives_figure import plot_drives
+
+        curves = {
+            drive.control.name: (drive.frequencies, drive.reflection, drive.impedance, drive.roots)
+            for drive in self.drives
+        }
+        return plot_drives(curves, self.rig.string.torsion.wave_impedance)
+
+
+def drive_control(name: str, rig: StringRig) -> DriveControl:
+    """Return the law of a name for the drive of a rig, designed if it is a dynamic one.
+
+    Parameters
+    ----------
+    name : str
+        A rule as of `rule_control`, or ``"dynamic-0"`` to ``"dynamic-4"``.
+    rig : StringRig
+        With a top drive.
+
+    Raises
+    ------
+    InputError
+        If there is no such law, or no top drive.
+    """
+    machine = machine_of(rig)
+    if name in _DYNAMIC:
+        return dynamic_drive_control(rig.string.torsion, machine, int(name[-1]))
+    if name not in RULES:
+        raise InputError("structure", name, f"one of {', '.join(DRIVE_NAMES)}")
+    return rule_control(name, machine, rig.string)
+
+
+def given_control(name: str, rig: StringRig, stiffness: float, damping: float) -> DriveControl:
+    """Return a PI law by its gains on the top's angle and speed, both negative where they brake.
+
+    Parameters
+    ----------
+    name : str
+        Of a rule of PI control.
+    rig : StringRig
+        With a top drive.
+    stiffness, damping : float
+        −Ki, N m/rad, and −Kp, N m s/rad.
+
+    Raises
+    ------
+    InputError
+        If the law has other gains, or a value is out of range.
+    """
+    machine = machine_of(rig)
+    if name not in RULES or name == "z-torque":
+        raise InputError("K1", "given", f"left out: {name} has a rule of its own")
+    for gain in (stiffness, damping):
+        if gain > 0.0:
+            raise InputError("K1", gain, "at most 0: it brakes a drive that is ahead")
+    return pi_control(machine, -damping, -stiffness, name=name)
+
+
+def machine_of(rig: Rig) -> DriveMachine:
+    """Return the drive of a rig.
+
+    Raises
+    ------
+    InputError
+        If it has none.
+    """
+    if not isinstance(rig, StringRig):
+        raise InputError("rig", "lumped to one mass each way", "a string with a [top_drive]")
+    if rig.drive is None:
+        raise InputError("rig", "speed imposed at the top", "a string with a [top_drive]")
+    return rig.drive
+
+
+def compare_drives(
+    rig: Rig,
+    structures: Sequence[str | DriveControl],
+    falling: FallingTorque | None = None,
+    modes: int = _MODES,
+) -> DriveComparison:
+    """Put drives of one string side by side.
+
+    Parameters
+    ----------
+    rig : StringRig
+        With a top drive.
+    structures : sequence of str or DriveControl
+        Names as of `drive_control`, or laws of your own.
+    falling : FallingTorque, optional
+        By which the bit's torque falls with its speed.
+    modes : int
+        How many modes of torsion.
+
+    Raises
+    ------
+    InputError
+        If the rig has no top drive, or there is no such structure.
+    """
+    began = time.perf_counter()
+    machine_of(rig)
+    assert isinstance(rig, StringRig)
+    if not structures:
+        raise InputError("structures", "none", "at least one")
+    law = FallingTorque() if falling is None else falling
+    controls = [drive_control(s, rig) if isinstance(s, str) else s for s in structures]
+    measured = tuple(measure_drive(rig.string, control, law, modes) for control in controls)
+    return DriveComparison(rig, law, measured, time.perf_counter() - began)

@@ -1,0 +1,83 @@
+"""Drives side by side, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from drillctrl.base import units
+from drillctrl.strings.drive_measures import DriveMeasures
+from drillctrl.strings.falling import FallingTorque
+from drillctrl.strings.rig import StringRig
+from drillctrl.strings.words import drive_text
+
+_COLUMN = 11
+
+
+def comparison_summary(
+    rig: StringRig, falling: FallingTorque, drives: Sequence[DriveMeasures]
+) -> str:
+    """Return a table, a column for each drive."""
+    line, machine = rig.string.torsion, rig.drive
+    assert machine is not None
+    drop, decay = falling.drop / 1e3, _rpm(falling.decay)
+    first = drives[0].modes
+    rows: list[tuple[str, list[str]]] = [("", [drive.control.name for drive in drives])]
+
+    def by_mode(title: str, value: Callable[[DriveMeasures, int], str]) -> None:
+        rows.append((title, []))
+        for i, mode in enumerate(first):
+            name = f"  {_ordinal(i + 1)} torsional, {mode.slope.mode_frequency:.3f} Hz"
+            rows.append((name, [value(drive, i) for drive in drives]))
+
+    by_mode("Critical slope, N·m·s", lambda drive, i: f"{drive.modes[i].slope.slope:.4g}")
+    rows.append(("  smallest", [f"{drive.smallest_slope:.4g}" for drive in drives]))
+    by_mode("|r| of the drive", lambda drive, i: f"{drive.modes[i].reflection:.3f}")
+    by_mode("Damping, % of critical", _damping)
+    by_mode("Threshold speed, rpm", lambda drive, i: _speed(drive.modes[i].threshold_speed))
+    rows.append(("Delay margin, ms", [_margin(drive.delay_margin) for drive in drives]))
+    if machine.torque_limit is not None:
+        swings = [f"{_rpm(drive.swing[0]):.3g}" if drive.swing else "" for drive in drives]
+        rows.append(("Top swing at the limit, rpm", swings))
+    alone = ["yes" if drive.stable else "NO" for drive in drives]
+    rows.append(("Stable with a free bit", alone))
+    width = max(len(label) for label, _ in rows) + 2
+    columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
+    head = [
+        f"{rig.string.length:.6g} m of string, {line.wave_impedance:.4g} N·m·s of the"
+        " uppermost pipe,",
+        drive_text(machine),
+        "Critical slope: by which the bit's torque may fall per unit of its speed.",
+        f"Threshold: for a torque that falls by {drop:.3g} kN·m over {decay:.3g} rpm.",
+        "",
+    ]
+    table = [
+        f"{label:<{width}}{''.join(f'{cell:>{columns}}' for cell in cells)}".rstrip()
+        for label, cells in rows
+    ]
+    return "\n".join([*head, *table])
+
+
+def _damping(drive: DriveMeasures, i: int) -> str:
+    root = drive.modes[i].root
+    return "absorbed" if root is None else f"{1e2 * root.damping_ratio:.3g}"
+
+
+def _margin(seconds: float) -> str:
+    if math.isnan(seconds):
+        return "unstable"
+    return "any" if math.isinf(seconds) else f"{1e3 * seconds:.3g}"
+
+
+def _speed(speed: float) -> str:
+    return "none" if math.isinf(speed) else f"{_rpm(speed):.1f}"
+
+
+def _rpm(speed: float) -> float:
+    return units.from_si(speed, units.ROTARY_SPEED, "rpm")
+
+
+def _ordinal(number: int) -> str:
+    endings = {1: "st", 2: "nd", 3: "rd"}
+    teen = number % 100 in (11, 12, 13)
+    return f"{number}{'th' if teen else endings.get(number % 10, 'th')}"

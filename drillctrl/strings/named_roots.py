@@ -1,0 +1,247 @@
+"""Roots of a bit on a string, named by the modes that they belong to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.case import Case
+from drillctrl.strings.check import AXIAL_BAND, TORSIONAL_BAND, Mode, string_modes
+from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.drive_law import DriveLaw
+from drillctrl.strings.drive_measures import BAND
+from drillctrl.strings.exact import ExactLoop, exact_loop
+from drillctrl.strings.model import PipeString
+from drillctrl.strings.slopes import mode_slopes
+
+_BIT = ("x", "dx", "theta", "dtheta")
+_LOADS = ("axial", "torque")
+# Where Newton's method begins: places in a mode's band, and growth over frequency.
+_PLACES, _DAMPED = 6, (0.1, 0.03, -0.01, -0.05, -0.2)
+_STEPS, _SHORT, _CONVERGED = 40, 0.1, 1e-9
+_MOST_SLOPES, _SAMPLES = 20, 100
+
+
+@dataclass(frozen=True)
+class NamedRoot:
+    """The least damped root of a mode.
+
+    Attributes
+    ----------
+    mode : Mode
+        Whose frequency, top held and bit free, is the nearest; see `string_modes`.
+    value : complex
+        1/s, imag > 0.
+    critical_slope : float or None
+        By which the torque of a bit that is otherwise free may fall with its speed, N m s/rad;
+        of torsional modes.
+    """
+
+    mode: Mode
+    value: complex
+    critical_slope: float | None
+
+    @property
+    def frequency(self) -> float:
+        """Of its modulus, Hz."""
+        return abs(self.value) / (2.0 * math.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """Share of critical; negative where it grows."""
+        return -self.value.real / abs(self.value)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields."""
+        return {
+            "name": self.mode.name,
+            "kind": self.mode.kind,
+            "number": self.mode.number,
+            "frequency": self.frequency,
+            "damping_ratio": self.damping_ratio,
+            "critical_slope": self.critical_slope,
+        }
+
+    @property
+    def text(self) -> str:
+        """Name, frequency, damping and critical slope."""
+        told = f"{self.mode.name}: {self.frequency:.4g} Hz, {1e2 * self.damping_ratio:.3g} %"
+        if self.critical_slope is None:
+            return told
+        return f"{told}, critical slope {self.critical_slope:.4g} N·m·s"
+
+
+@dataclass(frozen=True)
+class NamedRoots:
+    """What is told of the modes of a bit on a string.
+
+    Attributes
+    ----------
+    roots : tuple of NamedRoot
+        Torsional ones first, by mode.
+    control : DriveControl or None
+        What turns the string.
+    pipe : float
+        ζ of the uppermost pipe, N m s/rad.
+    """
+
+    roots: tuple[NamedRoot, ...]
+    control: DriveControl | None
+    pipe: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields ``modes``, and ``drive`` and ``reflection`` under a drive."""
+        fields: dict[str, Any] = {"modes": [root.to_dict() for root in self.roots]}
+        if self.control is not None:
+            frequencies = np.geomspace(*BAND, _SAMPLES)
+            returned = np.abs(self.control.reflection(2j * np.pi * frequencies, self.pipe))
+            fields["drive"] = {"structure": self.control.name, "law": self.control.to_dict()}
+            fields["reflection"] = {
+                "frequencies": frequencies.tolist(),
+                "magnitudes": returned.tolist(),
+            }
+        return fields
+
+    @property
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        texts = [root.text for root in self.roots]
+        named = list(zip(["Modes", *[""] * (len(texts) - 1)], texts, strict=True))
+        if self.control is None:
+            return named
+        return [("Drive", self.control.name), *named]
+
+
+def turned_by(case: Case) -> DriveControl | None:
+    """Return the law under which a drive turns the string of a case, if one does."""
+    blocks = () if case.plant is None else case.plant.blocks
+    laws = [block for block in blocks if isinstance(block, DriveLaw)]
+    return laws[0].__dict__["control"] if laws else None
+
+
+def named_roots(
+    case: Case,
+    structure: FeedbackStructure | None = None,
+    K1: FloatArray | None = None,
+    K2: FloatArray | None = None,
+) -> NamedRoots | None:
+    """Return the roots of a bit on an exact string by mode.
+
+    Newton's method begins at many places around every mode, up to 5 Hz in torsion and 10 Hz
+    along the string, and the least damped root that it finds nearest to a mode bears its name.
+
+    Parameters
+    ----------
+    case : Case
+        What drills, and where.
+    structure : FeedbackStructure, optional
+        Feedback of the bit's own motion.
+    K1, K2 : array, (m, p)
+        Its gains.
+
+    Returns
+    -------
+    NamedRoots or None
+        None where the string is none of pipe, nothing is known of what turns it, or the
+        feedback is of something else.
+    """
+    if case.plant is None or not isinstance(case.plant.string, PipeString):
+        return None
+    control = turned_by(case)
+    if (case.plant.blocks and control is None) or case.plant.string.string.hoisting_stiffness:
+        return None
+    string = case.plant.string.string
+    loop = exact_loop(case, None if control is None else _stiffness(control))
+    if structure is not None:
+        fits = set(structure.outputs) <= set(_BIT) and set(structure.inputs) <= set(_LOADS)
+        if not fits or K1 is None or K2 is None:
+            return None
+        loop = _with_feedback(loop, structure, K1, K2)
+    found: list[NamedRoot] = []
+    slopes: dict[int, float] = {}
+    for kind, line, highest in (
+        ("torsional", string.torsion, TORSIONAL_BAND),
+        ("axial", string.tension, AXIAL_BAND),
+    ):
+        modes = string_modes(line, kind, highest)
+        if kind == "torsional" and structure is None:
+            told = mode_slopes(line, control, min(len(modes), _MOST_SLOPES))
+            slopes = {slope.number: slope.slope for slope in told}
+        for mode, root in _by_mode(loop, modes, axial=kind == "axial"):
+            slope = slopes.get(mode.number) if kind == "torsional" else None
+            found.append(NamedRoot(mode, root, slope))
+    return NamedRoots(tuple(found), control, string.torsion.wave_impedance)
+
+
+def _stiffness(control: DriveControl) -> Callable[[ComplexArray], ComplexArray]:
+    return lambda s: np.asarray(s * control.impedance(s))
+
+
+def _with_feedback(
+    loop: ExactLoop, structure: FeedbackStructure, K1: FloatArray, K2: FloatArray
+) -> ExactLoop:
+    """Return the loop with torque and force that follow the bit's motion."""
+    now, then = loop.now.copy(), loop.then.copy()
+    rows = [_LOADS.index(name) for name in structure.inputs]
+    columns = [_BIT.index(name) for name in structure.outputs]
+    # What drives the bit is a load with the other sign.
+    now[np.ix_(rows, columns)] -= K1
+    then[np.ix_(rows, columns)] -= K2
+    return replace(loop, now=now, then=then)
+
+
+def _by_mode(
+    loop: ExactLoop, modes: tuple[Mode, ...], *, axial: bool
+) -> list[tuple[Mode, complex]]:
+    """Return modes of a kind with the least damped root of each, 1/s."""
+    held = 2.0 * np.pi * np.array([mode.frequency for mode in modes])
+    edges = np.concatenate([[0.0], 0.5 * (held[1:] + held[:-1])])
+    edges = np.append(edges, held[-1] + (held[-1] - edges[-1]))
+    places = np.linspace(edges[:-1], edges[1:], _PLACES + 1, axis=1)[:, 1:].ravel()
+    begin = np.concatenate([places * (1j + grows) for grows in _DAMPED] + [held * 1j])
+    roots = _newton(loop, np.asarray(begin / loop.rate, dtype=complex))
+    # A root is of the motion whose own root is nearer.
+    own, other = _distances(loop, roots)
+    roots = roots[own < other] if axial else roots[other <= own]
+    roots = roots * loop.rate
+    roots = roots[(roots.imag > 0.0) & (np.abs(roots.real) < 0.999 * np.abs(roots))]
+    found = []
+    for mode, low, high in zip(modes, edges[:-1], edges[1:], strict=True):
+        here = roots[(np.abs(roots) > low) & (np.abs(roots) <= high)]
+        if here.size:
+            found.append((mode, complex(here[np.argmax(here.real / np.abs(here))])))
+    return found
+
+
+def _newton(loop: ExactLoop, begin: ComplexArray) -> ComplexArray:
+    """Return the roots that Newton's method reaches from many places at once."""
+    s = np.asarray(begin, dtype=complex)
+    change = np.full(s.shape, np.inf, dtype=complex)
+    for _ in range(_STEPS):
+        step = 1e-6 * np.maximum(np.abs(s), 1e-3)
+        values = [loop(s), loop(s + step), loop(s - step)]
+        with np.errstate(all="ignore"):
+            change = 2.0 * step * values[0] / (values[1] - values[2])
+            size = np.abs(change) / (_SHORT * np.abs(s) + 1e-300)
+            change = np.where(size > 1.0, change / size, change)
+        change = np.where(np.isfinite(change), change, 0.0)
+        s = s - change
+    done = np.abs(change) < _CONVERGED * np.maximum(np.abs(s), 1e-3)
+    return np.asarray(s[done & (np.abs(loop(s)) < 1e-3)])
+
+
+def _distances(loop: ExactLoop, s: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far, by a Newton step, roots of axial and of torsional motion alone are."""
+    step = 1e-6 * np.maximum(np.abs(s), 1e-3)
+    low, here, high = loop.parts(s - step), loop.parts(s), loop.parts(s + step)
+    found = []
+    for i in (0, 1):
+        # The growth that is left out changes no zero, and little over a step.
+        found.append(np.abs(2.0 * step * here[i] / (high[i] - low[i])))
+    return found[0], found[1]

@@ -1,0 +1,156 @@
+"""Roots of a turned string by mode: of the plant in modes and of the exact string."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    DriveMachine,
+    InputError,
+    RigPoint,
+    Transfer,
+    as_case,
+    characteristic_roots,
+    cli,
+    close_loop,
+    drive_control,
+    preset_structure,
+    string_preset,
+)
+from drillctrl.cli.drives import driven_case
+from drillctrl.spectrum import characteristic
+from drillctrl.strings.drive_law import companion, driven_plant, without_integral
+from drillctrl.strings.exact import exact_loop
+from drillctrl.strings.named_roots import named_roots
+from tests.strings.finite_drive import root_near
+
+LATE = DriveMachine(2900.0, 60e3, delay=0.02, lag=0.005, encoder=0.002)
+RPM, M_PER_H = math.pi / 30.0, 1.0 / 3600.0
+
+
+def turned(name, machine):
+    rig = dataclasses.replace(string_preset("vertical-3000"), drive=machine)
+    control = drive_control(name, rig)
+    case = as_case(RigPoint(rig, 120 * RPM, 10 * M_PER_H), driven_plant(rig, control))
+    return rig, control, case
+
+
+@pytest.mark.parametrize("machine", [DriveMachine(2900.0), LATE])
+@pytest.mark.parametrize("name", ["stiff", "soft-torque", "z-torque", "dynamic-1"])
+def test_a_law_in_the_plant_has_the_roots_of_the_exact_string(name, machine):
+    _, control, case = turned(name, machine)
+    loop = case.system(())
+    exact = exact_loop(case, lambda s: s * control.impedance(s))
+    named = named_roots(case)
+    assert named.control == control
+    kinds = [root.mode.kind for root in named.roots]
+    assert kinds == sorted(kinds, reverse=True)
+    for root in named.roots[:3]:
+        near = root.value / exact.rate
+        assert exact.root(near) == pytest.approx(near, rel=1e-8)
+        assert root_near(loop, near) == pytest.approx(near, rel=1e-4)
+
+
+def test_names_of_the_papers_string():
+    rig = string_preset("paper-string")
+    case = as_case(RigPoint(rig, 180 * RPM, 5 * M_PER_H))
+    named = {root.mode.name: root for root in named_roots(case).roots}
+    # Of the plant in modes, by collocation and Newton's method.
+    roots = [root.value / rig.time_scale for root in characteristic_roots(case.system(), -0.08)]
+    known_names = {"1st torsional": 0.447, "2nd torsional": 1.690, "3rd torsional": 3.138}
+    known_names |= {"4th axial": 7.578, "5th axial": 9.882}
+    for name, hertz in known_names.items():
+        known = min(roots, key=lambda s: abs(s.imag / (2 * math.pi) - hertz))
+        assert named[name].value == pytest.approx(known, rel=1e-3)
+        assert named[name].damping_ratio == pytest.approx(-known.real / abs(known), abs=2e-4)
+        assert named[name].frequency == pytest.approx(hertz, abs=2e-3)
+
+
+def test_names_with_feedback_at_the_bit():
+    rig = string_preset("paper-string")
+    case = as_case(RigPoint(rig, 180 * RPM, 5 * M_PER_H))
+    structure, gains = preset_structure("case2"), ([[-0.5, -0.8]], [[0.3, 0.2]])
+    told = named_roots(case, structure, *map(np.array, gains))
+    assert told.control is None
+    system = close_loop(case.system(("torque",)), structure, *gains)
+    for root in told.roots[:3]:
+        s = root.value * rig.time_scale
+        step = 1.0 / characteristic.log_derivative_at(system, s * (1 + 1e-9))
+        assert abs(step) < 1e-3 * abs(s)
+        assert root.critical_slope is None
+
+
+def test_a_law_loses_nothing_in_its_states():
+    law = Transfer((3.0, 2.0, 5.0, 7.0), (1.0, 4.0, 6.0, 0.0))
+    k, rest = without_integral(law)
+    s = np.array([0.3 + 0.7j, -0.4 + 2.0j])
+    assert k / s + rest(s) == pytest.approx(law(s), rel=1e-12)
+    a, b, c, d = companion(rest)
+    for at in s:
+        value = c @ np.linalg.solve(at * np.eye(2) - a, b) + d
+        assert value == pytest.approx(complex(rest(at)), rel=1e-12)
+
+
+RIG = ("--rig", "vertical-3000", "--speed", "120 rpm", "--rop", "10 m/h")
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["analyze", *arguments])
+    said = capsys.readouterr()
+    return stop.value.code, said.out, said.err
+
+
+def test_analyze_tells_modes_and_reflection(capsys):
+    code, said, _ = run(capsys, *RIG, "--structure", "soft-torque", "--json")
+    assert code == 0
+    fields = json.loads(said)
+    assert fields["structure"] == "soft-torque"
+    first = fields["modes"][0]
+    assert (first["kind"], first["number"], first["name"]) == ("torsional", 1, "1st torsional")
+    assert {mode["kind"] for mode in fields["modes"]} == {"torsional", "axial"}
+    assert all(mode["damping_ratio"] > 0.0 for mode in fields["modes"][:4])
+    # By its rule: Kp = 4 ζ, Ki = ω1² J with the first mode under a held top.
+    kp, ki = fields["drive"]["law"]["speed"]["numerator"]
+    assert math.sqrt(ki / 2900.0) / (2 * math.pi) == pytest.approx(0.166, abs=1e-3)
+    reflection = fields["reflection"]
+    least = int(np.argmin(reflection["magnitudes"]))
+    assert reflection["magnitudes"][least] == pytest.approx(0.6, abs=5e-3)
+    assert reflection["frequencies"][least] == pytest.approx(0.166, abs=5e-3)
+    rig = string_preset("vertical-3000")
+    where = RigPoint(rig, 120 * RPM, 10 * M_PER_H)
+    given = f"{-ki} N*m/rad, {-kp} N*m*s/rad"
+    case = driven_case(where, "soft-torque", given, None, False)
+    label, told = named_roots(case).lines[1]
+    assert label == "Modes"
+    assert told.startswith(f"1st torsional: {first['frequency']:.4g} Hz")
+    assert told.endswith(f"critical slope {first['critical_slope']:.4g} N·m·s")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*RIG, "--structure", "stiff", "--K1", "7 kN*m/rad, -1 kN*m*s/rad"), "--K1"),
+        ((*RIG, "--structure", "z-torque", "--K1", "-7 kN*m/rad, -1 kN*m*s/rad"), "--K1"),
+        ((*RIG, "--structure", "stiff", "--K1", "-7, -1"), "--K1"),
+        ((*RIG, "--structure", "stiff", "--K2", "-7"), "--K2"),
+        ((*RIG, "--structure", "stiff", "--trials", "all"), "--trials"),
+        ((*RIG, "--structure", "dynamic-x"), "structure = dynamic-x"),
+        (("--structure", "stiff"), "--structure"),
+        (("--rig", "paper-string", *RIG[2:], "--structure", "stiff"), "[top_drive]"),
+        (("--rig", "table1", *RIG[2:], "--structure", "stiff"), "[top_drive]"),
+    ],
+)
+def test_what_does_not_fit_a_drive_is_refused(capsys, arguments, message):
+    code, said, error = run(capsys, *arguments)
+    assert (code, said) == (2, "")
+    assert message in error.splitlines()[-1]
+
+
+def test_a_case_of_something_else_has_no_names():
+    assert named_roots(as_case(RigPoint(string_preset("vertical-3000"), 12.0, 3e-3))) is None
+    with pytest.raises(InputError, match="structure = softer"):
+        drive_control("softer", string_preset("vertical-3000"))
