@@ -256,8 +256,8 @@ def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march before anything."""
     march = kernel("march", structure.physics)
     n, m = structure.arrays.B.shape
-    chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
-    following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
+    chain = np.zeros(data.LATE, dtype=np.int64)
+    following = np.ones(data.DELAYS, dtype=np.int64)
     ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(3)
     ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
     y = np.zeros(data.vector_length(n, m))
@@ -306,6 +306,8 @@ def _resume(past: Past, structure: Structure, settings: data.Settings, room: int
         if lag > 0.0:
             ints[march.LAG0 + i] = interpolate.step_at(history, steps, -lag)
     if past.model == "nonlinear":
-        where = settings, history, steps, chain, following, 0.0, y[2]
+        chain[:] = last[[data.LAG, data.FACE]]
+        passes = int(last[data.PASSES])
+        where = settings, history, steps, chain, following, passes, 0.0, y[2]
         ints[march.I_PASSES] = breaks.retrace(*where, 1e-13 * (1.0 + abs(y[2])))
     return standing

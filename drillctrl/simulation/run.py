@@ -188,7 +188,6 @@ def simulate(
         data.DONE: Status.DONE,
         data.COLLAPSE: Status.COLLAPSE,
         data.REVERSED: Status.REVERSED,
-        data.TOO_DEEP: Status.TOO_DEEP,
         data.NOT_FINITE: Status.NOT_FINITE,
         data.DIVERGED: Status.DIVERGED,
         data.PAUSED: Status.TIME_LIMIT,

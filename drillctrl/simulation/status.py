@@ -27,7 +27,6 @@ class Status(_Told):
     DIVERGED = "diverges", "the motion grew beyond what a bounded motion of the rig reaches"
     TIME_LIMIT = "time limit", "the wall time that was permitted is used up"
     COLLAPSE = "step collapse", "no step is short enough for the error that was asked"
-    TOO_DEEP = "face too old", "what the bit would meet was cut before all that is kept"
     NOT_FINITE = "not finite", "the motion left the numbers that a computer has"
 
 
