@@ -106,9 +106,13 @@ from .simulation.orbits import limit_cycle as limit_cycle
 from .simulation.orbits import separation as separation
 from .simulation.past import Past as Past
 from .simulation.result import Simulation as Simulation
+from .simulation.run import Interrupted as Interrupted
 from .simulation.run import simulate as simulate
 from .simulation.scenario import Change as Change
 from .simulation.scenario import Scenario as Scenario
+from .simulation.starts import StartRun as StartRun
+from .simulation.starts import StartSet as StartSet
+from .simulation.starts import simulate_starts as simulate_starts
 from .spectrum.count import count_right_of as count_right_of
 from .spectrum.proof import prove_count as prove_count
 from .spectrum.roots import Root as Root

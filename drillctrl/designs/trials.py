@@ -16,6 +16,7 @@ from drillctrl.simulation.outcome import (
 )
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.starts import Start, start_named
 from drillctrl.simulation.status import Outcome, Status
 
 # How long a run is: this many times the decay time of the torsional mode's own damping, of
@@ -29,28 +30,8 @@ _RTOL, _FINER = 1e-7, 1e-9
 _FEW, _MANY = 20_000, 60_000
 
 
-@dataclass(frozen=True)
-class Start:
-    """A perturbation of steady drilling.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    feed, speed : float
-        Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
-    """
-
-    name: str
-    feed: float
-    speed: float
-
-    def initial(self, point: OperatingPoint) -> dict[str, float]:
-        """Return the perturbation by state name."""
-        return {"dx": self.feed * point.penetration_rate, "dtheta": self.speed * point.omega0}
-
-
-STARTS = (Start("small", 0.05, 0.1), Start("kick", 0.5, 0.5), Start("back", 0.5, -0.5))
+# A bit that starts from rest or from stick says less of gains than of the rig.
+STARTS = tuple(start_named(name) for name in ("small", "kick", "back"))
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ BARRIER, BEGIN = 7, 8
 AT_LIMIT = 9
 
 # How the march stopped.
-DONE, MORE_ROOM, COLLAPSE, REVERSED, NOT_FINITE, PAUSED, DIVERGED = range(7)
+DONE, MORE_ROOM, COLLAPSE, REVERSED, NOT_FINITE, PAUSED, DIVERGED, INTERRUPTED = range(8)
 
 # A break of level L is a jump of the L-th derivative of x or θ. The pair of order 5 keeps its
 # order across breaks of a higher level than this in what is delayed.
