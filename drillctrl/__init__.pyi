@@ -100,6 +100,7 @@ from .robustness.radius import stability_radius as stability_radius
 from .robustness.transfer import frequency_response as frequency_response
 from .robustness.transfer import loop_transfer as loop_transfer
 from .simulation.controller import Controller as Controller
+from .simulation.drive_control import drive_controller as drive_controller
 from .simulation.energy import band_energy as band_energy
 from .simulation.floquet import floquet as floquet
 from .simulation.orbits import limit_cycle as limit_cycle

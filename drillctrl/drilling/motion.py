@@ -85,6 +85,8 @@ class MotionArrays(NamedTuple):
         Acts on the bit's states τ0 ago.
     depth : array, (9,)
         c1, c2 and d0 of the linear depth of cut.
+    dragged : tuple of bool
+        As in `Realisation`.
     """
 
     q: FloatArray
@@ -99,6 +101,12 @@ class MotionArrays(NamedTuple):
     linear: FloatArray
     linear_delayed: FloatArray
     depth: FloatArray
+    dragged: tuple[bool, bool]
+
+
+@by_form
+def _dragged(plant: Plant) -> tuple[bool, bool]:
+    return expressions(plant).structure.dragged
 
 
 # Relative stiffness below which a string is free: that of its modes spans five digits.
@@ -136,7 +144,7 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     delayed = linear[1] @ linear[2][:, :BIT_STATES]
     return MotionArrays(
         q.ravel(), steady.ravel(), a, e, b, t, c, r, late, linear[0], delayed,
-        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]),
+        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]), _dragged(plant),
     )  # fmt: skip
 
 

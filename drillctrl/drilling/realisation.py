@@ -38,6 +38,9 @@ class Realisation:
         Of the outputs.
     late : tuple of Late
         Terms that act with a delay.
+    dragged : tuple of bool
+        Whether inertia hangs on the imposed motion of the top end, axial and torsional: then
+        its acceleration acts as well, which ``T`` leaves out.
     """
 
     states: tuple[Signal, ...]
@@ -50,6 +53,7 @@ class Realisation:
     C: ca.SX
     R: ca.SX
     late: tuple[Late, ...] = ()
+    dragged: tuple[bool, bool] = (False, False)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -109,6 +113,11 @@ def realise(string: String) -> Realisation:
             place = 2 * TOP.index(followed)
             reference[2 * row, place] = 1
             reference[2 * row + 1, place + 1] = 1
+    dragged = [
+        top in string.imposed
+        and any(not entry.is_zero() for entry in string.mass[free, names.index(top)].nonzeros())
+        for top in TOP
+    ]
     load = ca.SX(2 * count, 2)
     for k, coordinate in enumerate(BIT):
         load[1::2, k] = -inverse[:, free.index(names.index(coordinate))]
@@ -123,6 +132,7 @@ def realise(string: String) -> Realisation:
     made = Realisation(
         tuple(states), tuple(inputs), tuple(states), a, load, b, t,
         ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
+        dragged=(dragged[0], dragged[1]),
     )  # fmt: skip
     for name, (quantity, weights) in string.outputs.items():
         # What an imposed end has moved is in the reference of all that hangs from it.

@@ -183,10 +183,17 @@ def check_start(
     Raises
     ------
     InputError
-        If a perturbed state is unknown, the bit would start turning backwards, the linear
-        model from rest, or a run from the past of another point, plant or model.
+        If a perturbed state is unknown, the bit would start turning backwards, the imposed
+        motion of a top end changes on which inertia hangs, the linear model is to start from
+        rest, or a run from the past of another point, plant or model.
     """
     kick = scenario.perturbation(structure.state_names)
+    feed_hangs, turn_hangs = structure.arrays.dragged
+    for change in scenario.changes:
+        for name, hangs in (("penetration_rate", feed_hangs), ("omega0", turn_hangs)):
+            if hangs and getattr(change, name) is not None:
+                wanted = "left out where a string with inertia hangs on the imposed motion"
+                raise InputError(name, getattr(change, name), wanted)
     start = scenario.start
     low = -structure.omega0
     if isinstance(start, Past):

@@ -146,4 +146,7 @@ class Scenario:
             piece(time, time + change.duration, target)
         # The last piece has no end; its length does not enter its row.
         piece(time, time + 1.0, now)
+        if self.changes and len(rows) == 1:
+            # One piece alone is taken for a drive that nothing changes.
+            rows.insert(0, [0.0] * 7 + [1.0, 0.0])
         return np.array(rows)
