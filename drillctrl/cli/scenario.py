@@ -90,7 +90,11 @@ def read_time(option: str, text: str, rig: Rig | None) -> float:
 
 
 def read_scenario(
-    start: str, initial: str, changes: tuple[str, ...], point: OperatingPoint, rig: Rig | None
+    start: str,
+    initial: str | None,
+    changes: tuple[str, ...],
+    point: OperatingPoint,
+    rig: Rig | None,
 ) -> Scenario:
     """Return how a run starts and what changes.
 
@@ -100,12 +104,34 @@ def read_scenario(
         If a text has not the form it should have.
     """
     from drillctrl.simulation.scenario import Scenario
+    from drillctrl.simulation.starts import START_NAMES, start_named
 
-    return Scenario(
-        start,
-        read_numbers("--initial", initial, "dx=1,dtheta=1"),
-        tuple(_read_change(text, point, rig) for text in changes),
-    )
+    later = tuple(_read_change(text, point, rig) for text in changes)
+    if start != "steady" and start not in START_NAMES:
+        raise InputError("--start", start, f"steady, {', '.join(START_NAMES)}")
+    usual = "dx=1,dtheta=1" if start == "steady" else ""
+    kick = read_numbers("--initial", usual if initial is None else initial, "dx=1,dtheta=1")
+    if start in ("steady", "rest", "stick"):
+        return Scenario(start, kick, later)
+    if initial is not None:
+        raise InputError("--initial", initial, f"left out with --start {start}")
+    return start_named(start).scenario(point, later)
+
+
+def read_starts(text: str, possible: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of starts: all that are possible, or those between commas."""
+    from drillctrl.simulation.starts import START_NAMES
+
+    if text == "all":
+        for name in START_NAMES:
+            if name not in possible:
+                click.echo(f"drillctrl: note: no such start here: {name}", err=True)
+        return possible
+    names = tuple(part.strip() for part in text.split(","))
+    for name in names:
+        if name not in START_NAMES or names.count(name) > 1:
+            raise InputError("--starts", text, f"all, or some of {','.join(START_NAMES)}")
+    return names
 
 
 def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:

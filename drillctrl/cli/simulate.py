@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
+from drillctrl.cli.output import check_figure, check_folder
 from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.roots import NOT_STABILISED
 from drillctrl.cli.scenario import (
     controller_options,
     read_controller,
     read_duration,
     read_scenario,
+    read_starts,
+    read_time,
 )
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from drillctrl.simulation.result import Simulation
-
-FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
 
 
 @click.command(name="simulate", cls=Verb)
@@ -45,7 +42,17 @@ FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
     show_default=True,
     help="Dimensionless, as every TIME; with a rig also '60 s'.",
 )
-@click.option("--start", default="steady", show_default=True, help="steady (drilling) or rest.")
+@click.option(
+    "--start",
+    default="steady",
+    show_default=True,
+    help="steady (drilling); rest; stick (bit stuck until then); small, kick, back (disturbed).",
+)
+@click.option(
+    "--starts",
+    metavar="NAMES",
+    help="A run from each: 'all' or some of small,kick,back,rest,stick; the worst is told.",
+)
 @click.option(
     "--initial",
     help="Perturbation at t = 0: x, dx, theta, dtheta (default dx=1,dtheta=1; none from rest).",
@@ -58,6 +65,12 @@ FIGURES = ("motion", "phase", "axial-phase", "linear", "face")
 )
 @click.option("--rtol", type=float, default=1e-8, show_default=True, help="Relative error.")
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop the run after these.")
+@click.option(
+    "--every", metavar="TIME", help="Rows of --out at these distances, not at every step."
+)
+@click.option(
+    "--require-stable", is_flag=True, help="Exit with 3 unless it settles or keeps swinging calmly."
+)
 @click.option("--floquet", is_flag=True, help="Floquet multipliers of the orbit at the end.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Motion: FILE.csv, .npz or .parquet.")
@@ -73,10 +86,13 @@ def simulate_command(
     cutting: str,
     duration: str,
     start: str,
+    starts: str | None,
     initial: str | None,
     change: tuple[str, ...],
     rtol: float,
     time_limit: float | None,
+    every: str | None,
+    require_stable: bool,
     floquet: bool,
     as_json: bool,
     out: str | None,
@@ -92,20 +108,19 @@ def simulate_command(
       drillctrl simulate --delta0 2.5 --structure case1 --K1 -3.82 --K2 3.61 --out motion.csv
       drillctrl simulate --delta0 2.5 --floquet --plot portrait.png --figure phase
       drillctrl simulate --rig table1 --speed "150 rpm" --rop "20 m/h" --duration "30 s"
+      drillctrl simulate --rig table1 --speed "80 rpm" --rop "20 m/h" --starts all
     """
     check_folder("--out", out)
     check_figure(plot)
     if figure not in FIGURES:
         raise InputError("--figure", figure, f"one of {', '.join(FIGURES)}")
-    if start not in ("steady", "rest"):
-        raise InputError("--start", start, "steady or rest")
     where = read_point(options)
     from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation.compile import is_compiled
-    from drillctrl.simulation.export import check_export_path, export_motion
-    from drillctrl.simulation.report import simulation_fields, simulation_summary
+    from drillctrl.simulation.export import check_export_path, checked_every
     from drillctrl.simulation.run import checked_run, simulate
+    from drillctrl.simulation.starts import possible_starts, start_runs
     from drillctrl.simulation.structure import structure_of
 
     if out is not None:
@@ -113,57 +128,38 @@ def simulate_command(
     rig = where.rig if isinstance(where, RigPoint) else None
     groups = where.operating_point() if isinstance(where, RigPoint) else where
     length = read_duration(duration, rig)
-    kick = initial if initial is not None else "" if start == "rest" else "dx=1,dtheta=1"
-    scenario = read_scenario(start, kick, change, groups, rig)
+    step = None if every is None else checked_every(read_time("--every", every, rig), length)
+    wanted = Wanted(out, step, plot, figure)
+    if starts is not None:
+        alone = {"--start": start != "steady", "--initial": initial is not None}
+        alone |= {"--floquet": floquet, "--figure linear": figure == "linear"}
+        for option, given in alone.items():
+            if given:
+                raise InputError(option, "given", "left out where there is --starts")
+    scenario = read_scenario(start, initial, change, groups, rig)
     controller = read_controller(options, where, groups, scenario, length, rig)
-    common: dict[str, Any] = {
-        "scenario": scenario,
-        "duration": length,
-        "cutting": cutting,
-        "rtol": rtol,
-    }
-    checked_run(groups, **common, controller=controller, model=model)
+    common: dict[str, Any] = {"duration": length, "cutting": cutting, "rtol": rtol}
+    check = {**common, "scenario": scenario, "controller": controller}
+    checked_run(groups, **check, model=model)
     if figure in ("linear", "face") and model == "linear":
         raise InputError("--figure", figure, "motion or phase for the linear model")
     if figure == "linear":
-        checked_run(groups, **common, model="linear")
+        checked_run(groups, **check, model="linear")
+    if time_limit is not None:
+        common["time_limit"] = checked_number("time_limit", time_limit, 0.0, open_low=True)
     if not is_compiled(structure_of(as_case(groups)).physics):
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
-
-    def again(model: str) -> Simulation:
-        stop = math.inf if time_limit is None else time_limit
-        return simulate(where, controller, **common, model=model, time_limit=stop)
-
-    run = again(model)
-    multipliers = None
-    if floquet:
-        from drillctrl.simulation.floquet import floquet as multipliers_of
-
-        multipliers = multipliers_of(run)
-    if out is not None:
-        writing("--out", out, lambda: export_motion(run, out))
-    if plot is not None:
-        write_figure(plot, _drawn(figure, run, again))
-    if as_json:
-        click.echo(json_text(simulation_fields(run, multipliers)))
+    if starts is not None:
+        names = read_starts(starts, possible_starts(where, model == "linear"))
+        made = start_runs(
+            where, controller, starts=names, changes=scenario.changes, **common, model=model
+        )
+        calm = deliver_starts(made, len(names), wanted, as_json)
     else:
-        click.echo(simulation_summary(run, multipliers))
 
+        def again(model: str) -> Simulation:
+            return simulate(where, controller, **common, scenario=scenario, model=model)
 
-def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation]) -> Figure | Axes:
-    from drillctrl.simulation.figure import (
-        plot_against_linear,
-        plot_phase_portrait,
-        plot_rock_face,
-    )
-
-    if figure == "motion":
-        return run.plot()
-    if figure == "linear":
-        ax = plot_against_linear(run, again("linear"))
-    elif figure == "face":
-        ax = plot_rock_face(run)
-    else:
-        plane = "torsion" if figure == "phase" else "axial"
-        ax = plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
-    return ax
+        calm = deliver_run(again, model, wanted, floquet, as_json)
+    if require_stable and not calm:
+        raise click.exceptions.Exit(NOT_STABILISED)

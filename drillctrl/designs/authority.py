@@ -21,12 +21,13 @@ from drillctrl.designs.drilling import (
     cost_of_gains,
     swing_families,
 )
-from drillctrl.designs.trials import MORE_STARTS, STARTS, Start, Trial, trial_run
-from drillctrl.designs.verdict import SEVERITY, Verdict, judge
+from drillctrl.designs.trials import MORE_STARTS, STARTS, Trial, trial_run
+from drillctrl.designs.verdict import FAILURES, Verdict, judge
 from drillctrl.drilling.case import Case
 from drillctrl.motion.torsion import torsional_modes
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
+from drillctrl.simulation.starts import Start
 from drillctrl.synthesis import problem
 from drillctrl.synthesis.objectives import Requirements, WorstLoop
 from drillctrl.synthesis.problem import Solution
@@ -85,7 +86,7 @@ class Candidate:
         assert self.verdict is not None
         ends = [trial.controlled for trial in self.trials]
         largest = max(np.inf if end.swing is None else end.swing for end in ends)
-        severity = max(SEVERITY.get(end.outcome, 0) for end in ends)
+        severity = max(FAILURES.get(end.outcome, 0) for end in ends)
         return (self.verdict.harm, severity, largest)
 
 

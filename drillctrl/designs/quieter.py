@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from drillctrl.designs.trials import STARTS, trial_run
-from drillctrl.designs.verdict import SEVERITY
+from drillctrl.designs.verdict import FAILURES
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 
@@ -72,7 +72,7 @@ def _largest_swing(case: Case) -> float | None:
     largest = 0.0
     for start in STARTS:
         end = trial_run(case, None, start)
-        if end.swing is None or SEVERITY.get(end.outcome, 0) or not end.swing <= QUIET:
+        if end.swing is None or FAILURES.get(end.outcome, 0) or not end.swing <= QUIET:
             return None
         largest = max(largest, end.swing)
     return largest

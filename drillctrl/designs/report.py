@@ -141,7 +141,7 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
         stands = robustness_of(result)
     modes = named_roots(result.case, result.structure, result.K1, result.K2)
     if not isinstance(result, Design):
-        return Report(result, stands, None, None, (), modes)
+        return Report(result, stands, None, None, (), modes=modes)
     at("bounds")
     decision = boundary_decision(result)
     other = None

@@ -16,6 +16,7 @@ from drillctrl.simulation.outcome import (
 )
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
+from drillctrl.simulation.starts import Start, start_named
 from drillctrl.simulation.status import Outcome, Status
 
 # How long a run is: this many times the decay time of the torsional mode's own damping, of
@@ -29,42 +30,16 @@ _RTOL, _FINER = 1e-7, 1e-9
 _FEW, _MANY = 20_000, 60_000
 
 
-@dataclass(frozen=True)
-class Start:
-    """A perturbation of steady drilling.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    feed, speed : float
-        Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
-    text : str
-        In words.
-    """
-
-    name: str
-    feed: float
-    speed: float
-    text: str
-
-    def initial(self, point: OperatingPoint) -> dict[str, float]:
-        """Return the perturbation by state name."""
-        return {"dx": self.feed * point.penetration_rate, "dtheta": self.speed * point.omega0}
-
-
-STARTS = (
-    Start("small", 0.05, 0.1, "a small disturbance"),
-    Start("kick", 0.5, 0.5, "a kick forward by half the speed"),
-    Start("back", 0.5, -0.5, "a kick back by half the speed"),
-)
+# A bit that starts from rest or from stick says less of gains than of the rig.
+STARTS = tuple(start_named(name) for name in ("small", "kick", "back"))
 # Irregular motions depend on how they start more than on the gains: what is chosen by runs is
 # tried from these too.
 MORE_STARTS = (
-    Start("halted", -1.0, -0.999, "a bit that stands still"),
-    Start("strong", 1.0, 0.7, "a kick forward by 70 % of the speed"),
-    Start("nudge", 0.2, 0.25, "a kick forward by a quarter of the speed"),
-    Start("nudge back", 0.2, -0.25, "a kick back by a quarter of the speed"),
+    start_named("rest"),
+    start_named("stick"),
+    Start("strong", "steady", 1.0, 0.7, "a kick forward by 70 % of the speed"),
+    Start("nudge", "steady", 0.2, 0.25, "a kick forward by a quarter of the speed"),
+    Start("nudge back", "steady", 0.2, -0.25, "a kick back by a quarter of the speed"),
 )
 
 
@@ -117,7 +92,7 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
             case,
             controller,
             duration=trial_duration(point),
-            initial=start.initial(point),
+            scenario=start.scenario(point),
             rtol=rtol,
             max_steps=most,
         )

@@ -25,7 +25,7 @@ _SWING, _STUCK, _FEED = 0.02, 0.02, 0.05
 _APART, _RATE = 0.1, 0.01
 # Less swing that is good where the bit sticks and slips still.
 _HALF = 0.5
-SEVERITY = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
+FAILURES = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
 _QUIET = (Outcome.SETTLES, Outcome.ORBIT, Outcome.BOUNCES)
 NO_GAINS = "there is no feedback to try"
 LEFT_OUT = "the gains have not been tried on the nonlinear motion"
@@ -178,13 +178,13 @@ def _what(found: Figures) -> str:
 def _harm(trial: Trial) -> str | None:
     """Say in what the controlled run is worse, if it is."""
     mine, free = trial.controlled, trial.uncontrolled
-    ends = SEVERITY.get(mine.outcome, 0)
+    ends = FAILURES.get(mine.outcome, 0)
     if mine.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES):
         return _beside(trial)
     if free is None:
         # Left out where the motion settles: nothing can be better without control.
         return None
-    if ends > SEVERITY.get(free.outcome, 0):
+    if ends > FAILURES.get(free.outcome, 0):
         return _beside(trial)
     if mine.outcome == Outcome.UNDECIDED and free.outcome != Outcome.UNDECIDED:
         return _beside(trial)
@@ -207,7 +207,7 @@ def _good(trial: Trial) -> str | None:
     if free is None or Outcome.UNDECIDED in (mine.outcome, free.outcome):
         return None
     after = f"after {trial.start.text}"
-    if SEVERITY.get(mine.outcome, 0) < SEVERITY.get(free.outcome, 0):
+    if FAILURES.get(mine.outcome, 0) < FAILURES.get(free.outcome, 0):
         return _beside(trial)
     slips = mine.outcome == Outcome.STICK_SLIP and not _more(free.swing, mine.swing, _HALF)
     if _more(free.swing, mine.swing, _SWING) and not slips:

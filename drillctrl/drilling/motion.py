@@ -87,6 +87,8 @@ class MotionArrays(NamedTuple):
         Acts on the bit's states τ0 ago.
     depth : array, (9,)
         c1, c2 and d0 of the linear depth of cut.
+    dragged : tuple of bool
+        As in `Realisation`.
     """
 
     q: FloatArray
@@ -102,6 +104,16 @@ class MotionArrays(NamedTuple):
     linear: FloatArray
     linear_delayed: FloatArray
     depth: FloatArray
+    dragged: tuple[bool, bool]
+
+
+@by_form
+def _dragged(plant: Plant) -> tuple[bool, bool]:
+    return expressions(plant).structure.dragged
+
+
+# Relative stiffness below which a string is free: that of its modes spans five digits.
+_FREE = 1e-10
 
 
 @by_form
@@ -135,8 +147,36 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     delayed = linear[1] @ linear[2][:, :BIT_STATES]
     return MotionArrays(
         q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear[0], delayed,
-        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]),
+        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]), _dragged(plant),
     )  # fmt: skip
+
+
+def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatArray]:
+    """Return states of a string whose bit stands still while the top end goes on, (n,) twice.
+
+    They are those when it came to rest from steady drilling, and so long after. The string is
+    wound and pressed together at the speeds of the top end, without vibration of its own.
+
+    Raises
+    ------
+    InputError
+        If such a motion does not exist.
+    """
+    n = arrays.A.shape[0]
+    c = Coefficients(*arrays.q[: len(Coefficients._fields)])
+    # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known.
+    fixed = np.array([0, 1, 2, 3])
+    free = np.arange(4, n)
+    unknown = np.hstack([arrays.A[:, free], arrays.E])
+    b, a = np.zeros(n), np.zeros(n)
+    b[[0, 2]] = a[[1, 3]] = -c.penetration_rate, -c.rotary_speed
+    for values, rate in ((b, np.zeros(n)), (a, b)):
+        wanted = rate - arrays.A[:, fixed] @ values[fixed]
+        found, *_ = np.linalg.lstsq(unknown, wanted, rcond=None)
+        if not np.allclose(unknown @ found, wanted, rtol=0.0, atol=1e-8 * abs(wanted).max()):
+            raise InputError("start", "stick", "steady where the string has no such motion")
+        values[free] = found[: free.size]
+    return a, a + time * b
 
 
 def rest_state(arrays: MotionArrays) -> FloatArray:
@@ -154,7 +194,7 @@ def rest_state(arrays: MotionArrays) -> FloatArray:
     state = -follows[:, 1] * c.penetration_rate - follows[:, 3] * c.rotary_speed
     wanted = (arrays.E @ arrays.steady - arrays.A @ state)[moving]
     held = arrays.A[np.ix_(moving, places)]
-    found, _, rank, _ = np.linalg.lstsq(held, wanted, rcond=None)
+    found, _, rank, _ = np.linalg.lstsq(held, wanted, rcond=_FREE)
     if rank < places.sum():
         raise InputError("start", "rest", "steady where nothing holds the string at its top")
     state[places] = found

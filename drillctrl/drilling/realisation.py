@@ -41,6 +41,9 @@ class Realisation:
         Terms that act with a delay.
     input_delays : mapping
         Input → how late it acts, for those that do.
+    dragged : tuple of bool
+        Whether inertia hangs on the imposed motion of the top end, axial and torsional: then
+        its acceleration acts as well, which ``T`` leaves out.
     """
 
     states: tuple[Signal, ...]
@@ -54,6 +57,7 @@ class Realisation:
     R: ca.SX
     late: tuple[Late, ...] = ()
     input_delays: Mapping[str, Expression] = field(default_factory=dict)
+    dragged: tuple[bool, bool] = (False, False)
 
     @property
     def delays_of_inputs(self) -> ca.SX:
@@ -118,6 +122,11 @@ def realise(string: String) -> Realisation:
             place = 2 * TOP.index(followed)
             reference[2 * row, place] = 1
             reference[2 * row + 1, place + 1] = 1
+    dragged = [
+        top in string.imposed
+        and any(not entry.is_zero() for entry in string.mass[free, names.index(top)].nonzeros())
+        for top in TOP
+    ]
     load = ca.SX(2 * count, 2)
     for k, coordinate in enumerate(BIT):
         load[1::2, k] = -inverse[:, free.index(names.index(coordinate))]
@@ -132,6 +141,7 @@ def realise(string: String) -> Realisation:
     made = Realisation(
         tuple(states), tuple(inputs), tuple(states), a, load, b, t,
         ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
+        dragged=(dragged[0], dragged[1]),
     )  # fmt: skip
     for name, (quantity, weights) in string.outputs.items():
         # What an imposed end has moved is in the reference of all that hangs from it.

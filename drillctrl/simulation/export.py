@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drillctrl.base.errors import InputError
+from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
 from drillctrl.base.tableio import csv_text
@@ -14,6 +15,7 @@ from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.rig_units import SI_UNITS
 
 ENDINGS = (".csv", ".npz", ".parquet")
+_MOST_ROWS = 10_000_000
 
 
 def check_export_path(path: str | Path) -> None:
@@ -25,8 +27,19 @@ def check_export_path(path: str | Path) -> None:
         required("pyarrow", "tables")
 
 
-def export_motion(simulation: Simulation, path: str | Path) -> None:
-    """Write the motion at the integrator's own steps, whole or not at all.
+def checked_every(every: float, duration: float) -> float:
+    """Return the time between rows of a table of a run that lasts so long, checked."""
+    return checked_number("every", every, duration / _MOST_ROWS, 1e9, open_low=True)
+
+
+def _instants(end: float, every: float) -> FloatArray:
+    """Return equally spaced instants of a run."""
+    step = checked_every(every, end)
+    return step * np.arange(int(end / step) + 1, dtype=float)
+
+
+def export_motion(simulation: Simulation, path: str | Path, every: float | None = None) -> None:
+    """Write the motion, whole or not at all.
 
     That of a rig is written in SI units, any other dimensionless.
 
@@ -37,19 +50,26 @@ def export_motion(simulation: Simulation, path: str | Path) -> None:
     path : str or Path
         ``.csv`` (a comment line with the units, then a header), ``.npz`` (one array a column) or
         ``.parquet`` (needs pyarrow).
+    every : float, optional
+        Dimensionless time between the rows, from 0 on; without it they are the integrator's
+        own steps.
 
     Raises
     ------
     InputError
-        If the ending is none of these.
+        If the ending is none of these, or there would be more rows than memory is for.
     OSError
         If the file cannot be written.
     """
     check_export_path(path)
-    if simulation.rig is None:
-        columns, units = simulation.motion.columns(), "dimensionless"
+    times = None if every is None else _instants(float(simulation.times[-1]), every)
+    rig = simulation.rig
+    if rig is None:
+        motion = simulation.motion if times is None else simulation.at(times)
+        columns, units = motion.columns(), "dimensionless"
     else:
-        columns = simulation.in_rig_units().columns()
+        seconds = None if times is None else times * rig.time_scale
+        columns = simulation.in_rig_units(seconds).columns()
         units = ", ".join(f"{name} in {unit}" for name, unit in SI_UNITS.items())
     ending = Path(path).suffix.lower()
     with replacing(path) as file:

@@ -15,7 +15,7 @@ from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.past import Past
-from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.scenario import STOOD, Scenario
 from drillctrl.simulation.structure import Structure
 
 FIRST_ROOM = 4096
@@ -183,10 +183,17 @@ def check_start(
     Raises
     ------
     InputError
-        If a perturbed state is unknown, the bit would start turning backwards, the linear
-        model from rest, or a run from the past of another point, plant or model.
+        If a perturbed state is unknown, the bit would start turning backwards, the imposed
+        motion of a top end changes on which inertia hangs, the linear model is to start from
+        rest, or a run from the past of another point, plant or model.
     """
     kick = scenario.perturbation(structure.state_names)
+    feed_hangs, turn_hangs = structure.arrays.dragged
+    for change in scenario.changes:
+        for name, hangs in (("penetration_rate", feed_hangs), ("omega0", turn_hangs)):
+            if hangs and getattr(change, name) is not None:
+                wanted = "left out where a string with inertia hangs on the imposed motion"
+                raise InputError(name, getattr(change, name), wanted)
     start = scenario.start
     low = -structure.omega0
     if isinstance(start, Past):
@@ -197,10 +204,11 @@ def check_start(
         if (start.model == "linear") != linear:
             raise InputError("model", "linear" if linear else "nonlinear", "that of the past")
         low -= float(start.state[3])
-    elif start == "rest":
+    elif start != "steady":
         if linear:
-            raise InputError("start", "rest", "steady for the linear model")
-        _ = structure.rest  # refused here where there is none
+            raise InputError("start", start, "steady for the linear model")
+        # Refused here where there is no such state.
+        _ = structure.rest if start == "rest" else structure.stuck(STOOD)
         low = 0.0
     if not linear and kick[3] < low:
         raise InputError("initial dtheta", kick[3], f"at least {low:g}: the bit must not turn back")
@@ -256,8 +264,8 @@ def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march before anything."""
     march = kernel("march", structure.physics)
     n, m = structure.arrays.B.shape
-    chain = np.zeros(data.MAX_FACE_LEVELS, dtype=np.int64)
-    following = np.ones(data.MAX_FACE_LEVELS + 3, dtype=np.int64)
+    chain = np.zeros(data.LATE, dtype=np.int64)
+    following = np.ones(data.DELAYS, dtype=np.int64)
     ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(3)
     ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
     y = np.zeros(data.vector_length(n, m))
@@ -266,7 +274,7 @@ def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
 
 def _set_off(structure: Structure, settings: data.Settings, start: str, room: int) -> March:
     """Return a march after steady drilling, or with a bit at rest."""
-    standing = _blank(structure, settings, room)
+    standing = _blank(structure, settings, room + 1)
     before, y = standing.history.real[0], standing.y
     before[[data.START, data.LENGTH]] = -1.0, 1.0
     if start == "rest":
@@ -282,7 +290,28 @@ def _set_off(structure: Structure, settings: data.Settings, start: str, room: in
             column = data.OTHERS + data.QUARTIC * (i - 4)
             before[column : column + 2] = y[i] - rate[i], rate[i]
     standing.history.whole[0, [data.CONTACT, data.PASSES]] = 1
-    return standing
+    return _stand_still(standing, structure) if start == "stick" else standing
+
+
+def _stand_still(standing: March, structure: Structure) -> March:
+    """Return a march in which the bit stood still before t = 0, after steady drilling."""
+    march = kernel("march", structure.physics)
+    row, whole = standing.history.real[1], standing.history.whole[1]
+    first, last = structure.stuck(STOOD)
+    turn = last - first
+    standing.history.real[0, data.START] -= STOOD
+    row[[data.START, data.LENGTH]] = -STOOD, STOOD
+    for place, i in ((data.X, 0), (data.THETA, 2)):
+        row[place : place + 2] = first[i], turn[i]
+    for i in range(4, len(first)):
+        column = data.OTHERS + data.QUARTIC * (i - 4)
+        row[column : column + 2] = first[i], turn[i]
+    whole[[data.CONTACT, data.PASSES, data.LEVEL]] = 1
+    whole[data.TORSION], whole[data.AXIAL] = data.STUCK, data.HELD
+    standing.y[: len(last)] = last
+    standing.ints[march.I_TORSION], standing.ints[march.I_AXIAL] = data.STUCK, data.HELD
+    standing.ints[march.STEPS] = 2
+    return standing._replace(first=2)
 
 
 def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
@@ -306,6 +335,8 @@ def _resume(past: Past, structure: Structure, settings: data.Settings, room: int
         if lag > 0.0:
             ints[march.LAG0 + i] = interpolate.step_at(history, steps, -lag)
     if past.model == "nonlinear":
-        where = settings, history, steps, chain, following, 0.0, y[2]
+        chain[:] = last[[data.LAG, data.FACE]]
+        passes = int(last[data.PASSES])
+        where = settings, history, steps, chain, following, passes, 0.0, y[2]
         ints[march.I_PASSES] = breaks.retrace(*where, 1e-13 * (1.0 + abs(y[2])))
     return standing

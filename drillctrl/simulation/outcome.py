@@ -41,8 +41,8 @@ class Figures:
         ``"bounces"``: the bit leaves the rock; ``"stick-slip"``: it stands still at times;
         ``"does-not-keep-up"``: it falls behind the feed of the top end, or has, so that the
         string presses on it with more than twice the steady weight; ``"stalls"``: it
-        stands still; ``"turns-back"``, ``"diverges"``; ``"undecided"``: the run ended for a
-        numerical reason and proves nothing. All but the last three are of the last quarter.
+        stands still; ``"turns-back"``, ``"diverges"``; ``"undecided"``: the run ended before
+        it can tell. All but the last three are of the last quarter.
     swing : float or None
         Stick-slip index, (max − min)/(2 mean) of the bit's speed in the last quarter; None
         too where the bit stands still.

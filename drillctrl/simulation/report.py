@@ -16,6 +16,7 @@ from drillctrl.simulation.status import Outcome, Status
 
 if TYPE_CHECKING:
     from drillctrl.simulation.floquet import Floquet
+    from drillctrl.simulation.starts import StartSet
 
 
 # Steps by which chattering is told, and how short they are then on the mean.
@@ -197,6 +198,26 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     lines.append(("Effort", f"{s.steps} steps, {s.events} events, {s.elapsed_seconds:.3g} s"))
     width = max(len(label) for label, _ in lines) + 2
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+
+
+def starts_summary(found: StartSet) -> str:
+    """Return a table of what became of each start, and the worst, for people."""
+    rows = [("Start", "Outcome", "swing", "stick", "feed")]
+    for run in found.runs:
+        f = run.figures
+        shares = (_cell(f.swing, ".3g"), _cell(f.stick_fraction, ".1%"), _cell(f.feed, ".1%"))
+        rows.append((run.start, str(f.outcome), *shares))
+    widths = [max(len(row[i]) for row in rows) + 2 for i in range(len(rows[0]))]
+    lines = [
+        "".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    worst = found.worst
+    return "\n".join([*lines, f"Worst: {worst.start}, {worst.figures.outcome.sentence}"])
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
 
 
 def _millimetres(run: Simulation, *axial: float) -> str:

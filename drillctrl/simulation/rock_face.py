@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +12,6 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.trace import Trace
-
-_MOST_PASSES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,8 @@ def rock_face(run: Trace, time: float, count: int = 181) -> RockFace:
     face, contact = _face(run, turned + angle - pitch, when)
     passes = np.ones(count, dtype=np.int64)
     if run.cutting == "multiple":
-        for back in range(2, _MOST_PASSES + 1):
+        # Before t = 0 all was drilled in contact, so that this ends.
+        for back in itertools.count(2):
             open_ = ~contact
             if not open_.any():
                 break

@@ -23,6 +23,21 @@ LONGEST = 1e6
 TRIES = 400_000
 
 
+class Interrupted(KeyboardInterrupt):
+    """An interrupt of a run, such as Ctrl-C, that keeps what was reached.
+
+    Attributes
+    ----------
+    simulation : Simulation
+        The run as far as it went.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        end = float(simulation.times[-1])
+        super().__init__(f"at t = {end:g} of {simulation.duration:g}; `simulation` has it so far")
+        self.simulation = simulation
+
+
 def checked_run(
     where: Where,
     scenario: Scenario | None = None,
@@ -138,6 +153,8 @@ def simulate(
     ------
     InputError
         If an argument is out of range.
+    Interrupted
+        On Ctrl-C, within a second; it carries the run as far as it went.
 
     Notes
     -----
@@ -188,28 +205,32 @@ def simulate(
         data.DONE: Status.DONE,
         data.COLLAPSE: Status.COLLAPSE,
         data.REVERSED: Status.REVERSED,
-        data.TOO_DEEP: Status.TOO_DEEP,
         data.NOT_FINITE: Status.NOT_FINITE,
         data.DIVERGED: Status.DIVERGED,
         data.PAUSED: Status.TIME_LIMIT,
+        data.INTERRUPTED: Status.INTERRUPTED,
     }
     started = time.perf_counter()
     # Few enough that an interrupt is heard soon.
     tries = TRIES // (len(structure.state_names) + 16)
-    while True:
-        outcome = march.march(*standing[:-1], duration, float(max_step), tries)
-        used = int(standing.ints[march.STEPS])
-        if outcome == data.PAUSED:
-            if time.perf_counter() - started <= time_limit:
-                continue
-            break
-        if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
-            break
-        room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
-        standing = standing._replace(history=resized(standing.history, room, used))
+    try:
+        while True:
+            outcome = march.march(*standing[:-1], duration, float(max_step), tries)
+            used = int(standing.ints[march.STEPS])
+            if outcome == data.PAUSED:
+                if time.perf_counter() - started <= time_limit:
+                    continue
+                break
+            if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
+                break
+            room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
+            standing = standing._replace(history=resized(standing.history, room, used))
+    except KeyboardInterrupt:
+        # Heard between two calls of the march, which leave all in place.
+        outcome, used = data.INTERRUPTED, int(standing.ints[march.STEPS])
     elapsed = time.perf_counter() - started
     history = resized(standing.history, used, used)
-    return Simulation(
+    run = Simulation(
         case=case,
         controller=controller,
         scenario=scenario,
@@ -228,3 +249,6 @@ def simulate(
         first=standing.first,
         rig=case.rig,
     )
+    if outcome == data.INTERRUPTED:
+        raise Interrupted(run)
+    return run

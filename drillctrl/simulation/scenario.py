@@ -13,7 +13,9 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.past import Past
 
-STARTS = ("steady", "rest")
+STARTS = ("steady", "rest", "stick")
+# Dimensionless time for which a bit that starts from stick has stood still.
+STOOD = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,9 +62,11 @@ class Scenario:
 
     Attributes
     ----------
-    start : {"steady", "rest"} or Past
+    start : {"steady", "rest", "stick"} or Past
         Steady drilling until t = 0; or a bit at rest that just touches flat rock, unloaded,
-        whose top end sets off at t = 0; or what another run left behind (`Simulation.past`).
+        whose top end sets off at t = 0; or a bit that has stood still for `STOOD` while the top
+        end went on, and is let go at t = 0; or what another run left behind
+        (`Simulation.past`).
     initial : mapping
         Perturbation by state name (x, dx, theta, dtheta of the bit) that is added at t = 0.
     changes : tuple of Change
@@ -142,4 +146,7 @@ class Scenario:
             piece(time, time + change.duration, target)
         # The last piece has no end; its length does not enter its row.
         piece(time, time + 1.0, now)
+        if self.changes and len(rows) == 1:
+            # One piece alone is taken for a drive that nothing changes.
+            rows.insert(0, [0.0] * 7 + [1.0, 0.0])
         return np.array(rows)

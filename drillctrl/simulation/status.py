@@ -25,9 +25,9 @@ class Status(_Told):
     REVERSED = "reverse rotation", "the bit turned backwards, for which the model has no face"
     STEP_LIMIT = "step limit", "the steps that were permitted are used up"
     DIVERGED = "diverges", "the motion grew beyond what a bounded motion of the rig reaches"
+    INTERRUPTED = "interrupted", "the run was stopped by hand"
     TIME_LIMIT = "time limit", "the wall time that was permitted is used up"
     COLLAPSE = "step collapse", "no step is short enough for the error that was asked"
-    TOO_DEEP = "face too old", "what the bit would meet was cut before all that is kept"
     NOT_FINITE = "not finite", "the motion left the numbers that a computer has"
 
 
@@ -44,5 +44,28 @@ class Outcome(_Told):
     DIVERGES = "diverges", "the motion grows without bound"
     UNDECIDED = (
         "undecided",
-        "the run breaks off for a numerical reason and proves nothing",
+        "the run ends before it can tell",
     )
+
+    @property
+    def severity(self) -> int:
+        """Rank from the best to the worst; an undecided run may be as bad as falling behind."""
+        return _BY_SEVERITY.index(self)
+
+    @property
+    def calm(self) -> bool:
+        """Whether the bit stays in the rock, turning, and keeps up with its feed."""
+        return self in (Outcome.SETTLES, Outcome.ORBIT)
+
+
+_BY_SEVERITY = (
+    Outcome.SETTLES,
+    Outcome.ORBIT,
+    Outcome.BOUNCES,
+    Outcome.STICK_SLIP,
+    Outcome.LATE,
+    Outcome.UNDECIDED,
+    Outcome.STALLS,
+    Outcome.TURNS_BACK,
+    Outcome.DIVERGES,
+)

@@ -13,7 +13,13 @@ from drillctrl.base.errors import InputError
 from drillctrl.drilling.bit_rock import BitRock, steady_delay, steady_depth
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.coefficients import Coefficients
-from drillctrl.drilling.motion import BIT_COEFFICIENTS, MotionArrays, law_functions, rest_state
+from drillctrl.drilling.motion import (
+    BIT_COEFFICIENTS,
+    MotionArrays,
+    law_functions,
+    rest_state,
+    stuck_states,
+)
 from drillctrl.simulation.translate import translate_module
 
 DECORATOR = "@numba.njit(cache=True, error_model='numpy')"
@@ -81,6 +87,10 @@ class Structure:
     def rest(self) -> FloatArray:
         """State of a bit at rest without load, the top end at V0 t = Ω0 t = 0, (n,)."""
         return rest_state(self.arrays)
+
+    def stuck(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """States of a string whose bit stands still: at first, and so long after, (n,) each."""
+        return stuck_states(self.arrays, time)
 
 
 @dataclass(frozen=True)

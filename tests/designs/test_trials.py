@@ -221,7 +221,7 @@ BROKEN, TURNS, GROWS = (
         (Figures(Outcome.ORBIT, 0.17, 0.0, 1.0, 1.0), SWINGS, False, True, "swings less"),
         (Figures(Outcome.STICK_SLIP, 0.2, 0.1, 1.0, 1.0), SWINGS, False, False, "sticks for 10 %"),
         (Figures(Outcome.LATE, 0.2, 0.0, 0.8, 1.0), SWINGS, False, False, "falls behind"),
-        (BROKEN, SWINGS, True, False, "numerical reason"),
+        (BROKEN, SWINGS, True, False, "before it can tell"),
         (Figures(Outcome.STALLS, None, 1.0, 0.0, 1.0), SWINGS, True, False, "stands still"),
         (SWINGS, Figures(Outcome.STALLS, None, 1.0, 0.0, 0.0), False, True, "stands still"),
         (TURNS, GROWS, True, False, "turns backwards"),

@@ -13,7 +13,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.run import simulate
+from drillctrl.simulation.run import Interrupted, simulate
 
 
 def table1_at(rpm, rop):
@@ -109,9 +109,16 @@ def test_an_interrupt_is_heard_within_a_second():
     began = time.perf_counter()
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(Interrupted) as stopped:
             simulate(OperatingPoint(10.0, 2.5, 14.0), duration=1e5, rtol=1e-12)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
     assert heard[0] - began < 1.0
+    assert time.perf_counter() - began < 2.0
+    kept = stopped.value.simulation
+    assert kept.status == "interrupted"
+    assert kept.steps > 100
+    assert str(kept.duration)[:3] in str(stopped.value)
+    again = simulate(OperatingPoint(10.0, 2.5, 14.0), duration=float(kept.times[50]), rtol=1e-12)
+    np.testing.assert_array_equal(again.times[:50], kept.times[:50])

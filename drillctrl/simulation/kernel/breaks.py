@@ -3,6 +3,10 @@
 A lag in angle sees a break when the bit has turned on by the lag from where the break was
 made; a lag in time when that time has passed. Steps end there, so that what is delayed is
 smooth within each step and the method keeps its order.
+
+Two lags in angle are followed: one blade pitch, and that of the pass which left the rock
+face. A bit off the rock leaves the face that it has under itself, so that one pitch later it
+is known without a look at the passes in between, however many there are.
 """
 
 from __future__ import annotations
@@ -11,15 +15,30 @@ import numpy as np
 
 from .data import (
     CONTACT,
+    FACE,
+    FAR,
     LAST_LEVEL,
     LEVEL,
-    MAX_FACE_LEVELS,
     MULTIPLE,
+    NEAR,
+    PASSES,
     STUCK,
 )
 from .interpolate import beyond, locate_angle, pitch_of, step_before_angle
 from .jit import entry, inner
 from .physics import rates
+
+
+@inner
+def lags_of(mode):
+    """How many lags in angle there are: two where the face is not that of the last pass."""
+    return 2 if mode.passes > 1 else 1
+
+
+@inner
+def pitches_beyond(mode, k):
+    """Blade pitches by which lag k is longer than one."""
+    return mode.passes - 1 if k == FAR else 0
 
 
 @inner
@@ -33,9 +52,9 @@ def advance(history, steps, following, k, at):
 
 
 @inner
-def angle_left(history, bit, b, k, t, theta):
-    """Angle the bit has yet to turn until the lag of k + 1 pitches reaches break b."""
-    return -beyond(history, bit, b, 0.0, t, theta, k * pitch_of(bit))
+def angle_left(history, bit, b, pitches, t, theta):
+    """Angle the bit has yet to turn until the lag of pitches + 1 reaches break b."""
+    return -beyond(history, bit, b, 0.0, t, theta, pitches * pitch_of(bit))
 
 
 @inner
@@ -57,10 +76,10 @@ def angle_limits(history, bit, steps, mode, chain, following, t, y, acceleration
         return np.inf, np.inf
     rate = rates((0.0, 0.0, 0.0, y[3]), bit)[1]
     nearest = np.inf
-    for k in range(mode.passes):
+    for k in range(lags_of(mode)):
         b = advance(history, steps, following, k, chain[k])
         if b < steps:
-            left = angle_left(history, bit, b, k, t, y[2])
+            left = angle_left(history, bit, b, pitches_beyond(mode, k), t, y[2])
             nearest = min(nearest, time_to_turn(left, rate, acceleration))
     return nearest, time_to_turn(0.9 * pitch_of(bit), rate, acceleration)
 
@@ -71,10 +90,10 @@ def least_angle_left(history, bit, steps, mode, following, t, theta):
     least, which = np.inf, -1
     if mode.torsion == STUCK:
         return least, which
-    for k in range(mode.passes):
+    for k in range(lags_of(mode)):
         b = following[k]
         if b < steps:
-            left = angle_left(history, bit, b, k, t, theta)
+            left = angle_left(history, bit, b, pitches_beyond(mode, k), t, theta)
             if left < least:
                 least, which = left, k
     return least, which
@@ -84,29 +103,33 @@ def least_angle_left(history, bit, steps, mode, following, t, theta):
 def follow(settings, history, steps, mode, chain, t, theta):
     """Move the places of the lagged instants along, within their smooth pieces."""
     pitch = pitch_of(settings.bit)
-    for k in range(mode.passes):
-        j, _ = locate_angle(history, settings.bit, steps, chain[k], t, theta, k * pitch)
+    for k in range(lags_of(mode)):
+        extra = pitches_beyond(mode, k) * pitch
+        j, _ = locate_angle(history, settings.bit, steps, chain[k], t, theta, extra)
         if j >= 0:
             chain[k] = j
 
 
 @entry
-def retrace(settings, history, steps, chain, following, t, theta, tolerance):
+def retrace(settings, history, steps, chain, following, passes, t, theta, tolerance):
     """Find the lagged instants anew, across breaks; return how many passes back the face is.
 
     With one lag the face is what the blade ahead left, wherever it was. With all passes
-    counted, a blade that was off the rock left the face of the pass before.
+    counted, a blade that was off the rock left the face that it had under itself.
     """
-    pitch = pitch_of(settings.bit)
-    start = chain[0]
-    for k in range(MAX_FACE_LEVELS):
-        b = following[k] if k == 0 else start
-        b = min(max(b, start), steps - 1) if k == 0 else start
-        j = step_before_angle(history, settings.bit, b, t, theta, k * pitch, tolerance)
-        chain[k], following[k], start = j, j + 1, j
-        if settings.whole[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
-            return k + 1
-    return MAX_FACE_LEVELS + 1
+    pitch, last = pitch_of(settings.bit), steps - 1
+    start = min(max(following[NEAR], chain[NEAR]), last)
+    j = step_before_angle(history, settings.bit, start, t, theta, 0.0, tolerance)
+    chain[NEAR], following[NEAR] = j, j + 1
+    if settings.whole[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
+        return 1
+    now = history.whole[j, PASSES] + 1
+    # The first step is motion without end, from which no search goes forward.
+    start = min(max(chain[FAR] if now == passes else history.whole[j, FACE], 1), last)
+    extra = (now - 1) * pitch
+    j = step_before_angle(history, settings.bit, start, t, theta, extra, tolerance)
+    chain[FAR], following[FAR] = j, j + 1
+    return now
 
 
 @inner

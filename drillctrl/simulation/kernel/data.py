@@ -24,13 +24,15 @@ BARRIER, BEGIN = 7, 8
 AT_LIMIT = 9
 
 # How the march stopped.
-DONE, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE, PAUSED, DIVERGED = range(8)
+DONE, MORE_ROOM, COLLAPSE, REVERSED, NOT_FINITE, PAUSED, DIVERGED, INTERRUPTED = range(8)
 
 # A break of level L is a jump of the L-th derivative of x or θ. The pair of order 5 keeps its
 # order across breaks of a higher level than this in what is delayed.
 LAST_LEVEL = 4
 NO_BREAK = 99
-MAX_FACE_LEVELS = 400
+# Delayed instants that are followed: a pitch back, that at which the rock face was left, and
+# from LATE on those of constant delays.
+NEAR, FAR, LATE, DELAYS = 0, 1, 2, 5
 
 # Entries of ``Settings.whole``: sizes of the plant, switches, and from ROWS on the matrix.
 STATES, INPUTS, OUTPUTS = 0, 1, 2

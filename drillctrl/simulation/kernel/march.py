@@ -23,12 +23,14 @@ from .data import (
     DIVERGED,
     DONE,
     END,
+    FAR,
     FEEDBACK,
     INPUTS,
+    LATE,
     LEVEL,
     LINEAR,
-    MAX_FACE_LEVELS,
     MORE_ROOM,
+    NEAR,
     NO_BREAK,
     NOT_FINITE,
     P_ROOM,
@@ -40,7 +42,6 @@ from .data import (
     START,
     STATES,
     STUCK,
-    TOO_DEEP,
     TORSION,
     Mode,
     Work,
@@ -71,8 +72,8 @@ def mode_of(ints, chain):
         ints[I_TORSION],
         ints[I_AXIAL],
         ints[I_SATURATED],
-        chain[0],
-        chain[passes - 1],
+        chain[NEAR],
+        chain[FAR] if passes > 1 else chain[NEAR],
         passes,
         ints[LAG0],
         ints[LAG0 + 1],
@@ -122,7 +123,7 @@ def time_limits(settings, history, steps, ints, following, t):
         lag = lag_of(settings, i, ints[GAINS])
         if lag > 0.0:
             longest = min(longest, lag)
-            b = advance(history, steps, following, MAX_FACE_LEVELS + i, ints[LAG0 + i])
+            b = advance(history, steps, following, LATE + i, ints[LAG0 + i])
             if b < steps:
                 nearest = min(nearest, history.real[b, START] + lag)
     return nearest, longest
@@ -137,12 +138,12 @@ def pass_time_breaks(settings, history, steps, ints, following, t):
         if lag == 0.0:
             continue
         gain = 1 if i > 0 and settings.whole[RATE_FEEDBACK] == 1 else 2
-        b = following[MAX_FACE_LEVELS + i]
+        b = following[LATE + i]
         # Breaks that several delays bring at once differ by rounding; no step fits in between.
         while b < steps and history.real[b, START] + lag <= t + SHORTEST * max(1.0, abs(t)):
             level = min(level, history.whole[b, LEVEL] + gain)
             ints[LAG0 + i] = b
-            b = advance(history, steps, following, MAX_FACE_LEVELS + i, b)
+            b = advance(history, steps, following, LATE + i, b)
         j, _ = locate_time(history, steps, ints[LAG0 + i], t - lag)
         ints[LAG0 + i] = j
     return level
@@ -154,7 +155,7 @@ def seek_past(settings, history, steps, ints, following, t):
     lag = lag_of(settings, 2, ints[GAINS])
     if lag > 0.0:
         ints[LAG0 + 2] = step_at(history, steps, t - lag)
-        following[MAX_FACE_LEVELS + 2] = 0
+        following[LATE + 2] = 0
 
 
 @inner
@@ -165,10 +166,12 @@ def pass_angle_break(settings, history, steps, ints, chain, following, which, t,
     level = passed_on(history.whole[b, LEVEL], history.whole[b, TORSION] == STUCK, gain)
     chain[which] = b
     tolerance = 2.0 * PASSED * turned_by(settings, t, theta)
-    ints[I_PASSES] = retrace(settings, history, steps, chain, following, t, theta, tolerance)
-    if ints[I_PASSES] <= MAX_FACE_LEVELS:
-        follow(settings, history, steps, mode_of(ints, chain), chain, t, theta)
-    return level
+    before = ints[I_PASSES]
+    passes = retrace(settings, history, steps, chain, following, before, t, theta, tolerance)
+    ints[I_PASSES] = passes
+    follow(settings, history, steps, mode_of(ints, chain), chain, t, theta)
+    # Another pass may have left a step in the face; and a pitch on the change is to be seen.
+    return level if passes == before else min(level, 2)
 
 
 @inner
@@ -207,8 +210,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
     Returns
     -------
     int
-        Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, TOO_DEEP, NOT_FINITE or
-        DIVERGED.
+        Why it stopped: DONE, PAUSED, MORE_ROOM, COLLAPSE, REVERSED, NOT_FINITE or DIVERGED.
     """
     bit, size = settings.bit, moving(settings)
     linear = settings.whole[LINEAR] == 1
@@ -248,8 +250,6 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                 level = pass_angle_break(
                     settings, history, steps, ints, chain, following, which, t, y[2]
                 )
-                if ints[I_PASSES] > MAX_FACE_LEVELS:
-                    return TOO_DEEP
                 if level <= 2:
                     enter(settings, history, steps, ints, chain, BARRIER, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level)
@@ -357,8 +357,6 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                     settings, history, steps, ints, chain, following, reached, t, y[2]
                 ),
             )
-            if ints[I_PASSES] > MAX_FACE_LEVELS:
-                return TOO_DEEP
         gains = ints[GAINS]
         if take_sample(settings, history, steps, ints, reals, t, y):
             level = 2

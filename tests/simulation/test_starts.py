@@ -1,0 +1,105 @@
+"""Several starts in one call: each begins as it says, and the worst is told."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from drillctrl.base.errors import InputError
+from drillctrl.cli import main
+from drillctrl.drilling.case import as_case
+from drillctrl.drilling.motion import stuck_states
+from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.rig import table1
+from drillctrl.simulation.scenario import STOOD
+from drillctrl.simulation.starts import possible_starts, simulate_starts
+from drillctrl.simulation.structure import structure_of
+from drillctrl.strings.presets import string_preset
+
+HARMLESS = OperatingPoint(14.0, 0.5, 14.0)
+
+
+def at(rig, rpm, rop):
+    return RigPoint(rig, rpm * 2.0 * math.pi / 60.0, rop / 3600.0)
+
+
+def test_each_start_begins_as_it_says():
+    found = simulate_starts(HARMLESS, duration=10.0, rtol=1e-6)
+    begin = {run.start: run.simulation.at([0.0]) for run in found.runs}
+    v0, omega0 = HARMLESS.penetration_rate, HARMLESS.omega0
+    for name, feed, speed in (("small", 0.05, 0.1), ("kick", 0.5, 0.5), ("back", 0.5, -0.5)):
+        assert begin[name].dx[0] == pytest.approx(feed * v0)
+        assert begin[name].dtheta[0] == pytest.approx(speed * omega0)
+    for name in ("rest", "stick"):
+        assert begin[name].dx[0] == -v0
+        assert begin[name].dtheta[0] == -omega0
+    # The top end has gone on while the bit stood.
+    assert begin["stick"].theta[0] == pytest.approx(-STOOD * omega0)
+    assert begin["stick"].x[0] == pytest.approx(-STOOD * v0)
+
+
+def test_a_string_is_wound_up_without_shaking():
+    """The state moves on as b, so A (a + b t) + E (load − steady) is b at both ends."""
+    arrays = structure_of(as_case(at(string_preset("paper-string"), 120.0, 20.0))).arrays
+    first, last = stuck_states(arrays, 2.0)
+    rate = 0.5 * (last - first)
+    for state in (first, last):
+        missing = rate - arrays.A @ state
+        # The rock bears what the bit lacks, and nothing else is missing.
+        missing -= arrays.E @ np.linalg.solve(arrays.E[[1, 3]], missing[[1, 3]])
+        np.testing.assert_allclose(missing, 0.0, atol=1e-9 * abs(arrays.A @ state).max())
+    np.testing.assert_allclose(last[[1, 3]], rate[[0, 2]])
+    # Without inertia the uppermost pipe would bear what the lumped spring does.
+    assert rate[2] == pytest.approx(-at(table1(), 120.0, 20.0).operating_point().omega0, rel=0.01)
+
+
+def test_the_worst_is_told():
+    calm = simulate_starts(HARMLESS, starts=("small", "kick"), duration=30.0, rtol=1e-6)
+    assert calm.calm
+    swings = [run.figures.swing for run in calm.runs]
+    assert calm.worst.figures.swing == max(swings)
+    found = simulate_starts(at(table1(), 120.0, 20.0), duration=150.0, rtol=1e-6)
+    outcomes = {run.start: str(run.figures.outcome) for run in found.runs}
+    assert outcomes["small"] == "orbit"
+    assert outcomes["stick"] == "turns-back"
+    assert found.worst.start == "stick"
+    assert not found.calm
+    assert found.to_dict()["worst"] == {"start": "stick", "outcome": "turns-back"}
+
+
+def test_a_drive_that_is_free_to_turn_has_no_rest():
+    where = at(string_preset("vertical-3000"), 120.0, 20.0)
+    assert possible_starts(where) == ("small", "kick", "back", "stick")
+    with pytest.raises(InputError, match="start = rest"):
+        simulate_starts(where, starts=("rest",), duration=1.0)
+    for names in ((), ("kick", "kick"), ("moon",)):
+        with pytest.raises(InputError, match="start"):
+            simulate_starts(HARMLESS, starts=names, duration=1.0)
+
+
+def test_the_command_says_so(capsys, tmp_path):
+    rig = ("--rig", "table1", "--rop", "20 m/h", "--duration", "60", "--rtol", "1e-6")
+    arguments = ["simulate", *rig, "--speed", "120 rpm", "--starts", "small,stick"]
+    out = ("--out", str(tmp_path / "worst.csv"), "--every", "0.5")
+    with pytest.raises(SystemExit) as stop:
+        main([*arguments, "--json", "--require-stable", *out])
+    assert stop.value.code == 3
+    fields = json.loads(capsys.readouterr().out)
+    assert fields["outcome"] == "turns-back"
+    assert fields["worst"] == {"start": "stick", "outcome": "turns-back"}
+    assert [run["start"] for run in fields["starts"]] == ["small", "stick"]
+    rows = (tmp_path / "worst.csv").read_text().splitlines()
+    times = [float(row.split(",")[0]) for row in rows[2:]]
+    steps = np.diff(times)
+    np.testing.assert_allclose(steps, 0.5 * table1().time_scale, rtol=1e-9)
+    with pytest.raises(SystemExit) as stop:
+        main([*arguments, "--require-stable"])
+    assert stop.value.code == 3
+    told = capsys.readouterr().out
+    assert "Worst: stick, the bit turns backwards" in told
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", *rig, "--speed", "150 rpm", "--starts", "small", "--require-stable"])
+    assert stop.value.code == 0
