@@ -290,10 +290,10 @@ def _set_off(structure: Structure, settings: data.Settings, start: str, room: in
             column = data.OTHERS + data.QUARTIC * (i - 4)
             before[column : column + 2] = y[i] - rate[i], rate[i]
     standing.history.whole[0, [data.CONTACT, data.PASSES]] = 1
-    return _stand_still(standing, structure) if start == "stick" else standing
+    return _stand_still(standing, structure, settings) if start == "stick" else standing
 
 
-def _stand_still(standing: March, structure: Structure) -> March:
+def _stand_still(standing: March, structure: Structure, settings: data.Settings) -> March:
     """Return a march in which the bit stood still before t = 0, after steady drilling."""
     march = kernel("march", structure.physics)
     row, whole = standing.history.real[1], standing.history.whole[1]
@@ -311,14 +311,24 @@ def _stand_still(standing: March, structure: Structure) -> March:
     standing.y[: len(last)] = last
     standing.ints[march.I_TORSION], standing.ints[march.I_AXIAL] = data.STUCK, data.HELD
     standing.ints[march.STEPS] = 2
+    _look_back(standing, structure, settings, 2)
     return standing._replace(first=2)
+
+
+def _look_back(standing: March, structure: Structure, settings: data.Settings, steps: int) -> None:
+    """Set the steps before t = 0 at which constant delays look."""
+    march, model, interpolate = (
+        kernel(name, structure.physics) for name in ("march", "model", "interpolate")
+    )
+    for i in range(3):
+        lag = model.lag_of(settings, i, 0)
+        if lag > 0.0:
+            standing.ints[march.LAG0 + i] = interpolate.step_at(standing.history, steps, -lag)
 
 
 def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march that goes on from what another has left behind."""
-    march, breaks, model, interpolate = (
-        kernel(name, structure.physics) for name in ("march", "breaks", "model", "interpolate")
-    )
+    march, breaks = (kernel(name, structure.physics) for name in ("march", "breaks"))
     steps = len(past.real)
     standing = _blank(structure, settings, steps + room)._replace(first=steps)
     _, history, ints, _, y, chain, following, _ = standing
@@ -330,10 +340,7 @@ def _resume(past: Past, structure: Structure, settings: data.Settings, room: int
     ints[march.I_TORSION], ints[march.I_AXIAL] = last[data.TORSION], last[data.AXIAL]
     # Another controller takes over: its torque need not continue the one before.
     ints[march.I_LEVEL] = 2
-    for i in range(3):
-        lag = model.lag_of(settings, i, 0)
-        if lag > 0.0:
-            ints[march.LAG0 + i] = interpolate.step_at(history, steps, -lag)
+    _look_back(standing, structure, settings, steps)
     if past.model == "nonlinear":
         chain[:] = last[[data.LAG, data.FACE]]
         passes = int(last[data.PASSES])

@@ -14,7 +14,9 @@ from drillctrl.drilling.case import as_case
 from drillctrl.drilling.motion import stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
-from drillctrl.simulation.scenario import STOOD
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.run import simulate
+from drillctrl.simulation.scenario import STOOD, Scenario
 from drillctrl.simulation.starts import possible_starts, simulate_starts
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.presets import string_preset
@@ -103,3 +105,24 @@ def test_the_command_says_so(capsys, tmp_path):
     with pytest.raises(SystemExit) as stop:
         main(["simulate", *rig, "--speed", "150 rpm", "--starts", "small", "--require-stable"])
     assert stop.value.code == 0
+
+
+@pytest.mark.parametrize("feedback", [{"measurement_delay": 0.2}, {}, {"measurement_delay": 1.5}])
+def test_feedback_that_looks_back_into_the_stick(feedback):
+    """Times rise, and what is fed back late is what the bit did then."""
+    point = OperatingPoint(2.95, 0.37, 14.14)
+    controller = Controller("case1", [-0.3], [0.4], **feedback)
+    run = simulate(point, controller, duration=4.0, scenario=Scenario(start="stick"), rtol=1e-9)
+    assert (np.diff(run.times) > 0.0).all()
+    late = feedback.get("measurement_delay", 0.0)
+    at = np.linspace(0.01, 3.9, 50)
+
+    def angle(times):
+        # Before t = 0 the bit stands still, against the frame of steady drilling.
+        found = run.at(np.maximum(times, 0.0), ("theta",)).theta
+        since = np.maximum(times, -STOOD)
+        stood = np.where(times < 0.0, -point.omega0 * since, 0.0)
+        return found + stood
+
+    wanted = -0.3 * angle(at - late) + 0.4 * angle(at - late - point.delay)
+    np.testing.assert_allclose(run.at(at, ("torque",)).torque, wanted, atol=1e-6)
