@@ -131,8 +131,9 @@ def test_analyze_tells_modes_and_reflection(capsys):
     where = RigPoint(rig, 120 * RPM, 10 * M_PER_H)
     given = f"{-ki} N*m/rad, {-kp} N*m*s/rad"
     case = driven_case(where, "soft-torque", (given, None), False, PaperLaw())
-    label, told = named_roots(case).lines[1]
-    assert label == "Modes"
+    lines = named_roots(case).lines
+    assert [label for label, _ in lines[:2]] == ["Drive", "Modes"]
+    told = lines[2][1]
     assert told.startswith(f"1st torsional: {first['frequency']:.4g} Hz")
     assert told.endswith(f"critical slope {first['critical_slope']:.4g} N·m·s")
 
