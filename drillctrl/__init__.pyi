@@ -49,6 +49,7 @@ from .drilling.case import as_case as as_case
 from .drilling.case import plant_system as plant_system
 from .drilling.coefficients import Coefficients as Coefficients
 from .drilling.drive import TopDrive as TopDrive
+from .drilling.friction import FreeBit as FreeBit
 from .drilling.friction import Stribeck as Stribeck
 from .drilling.plant import Plant as Plant
 from .drilling.plant import paper_plant as paper_plant

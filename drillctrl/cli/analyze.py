@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import click
 
+from drillctrl.cli.bit_law import bit_law_options, read_bit_law
 from drillctrl.cli.drives import are_drives, driven_case
 from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.point import point_options, read_point
@@ -34,6 +36,7 @@ from drillctrl.cli.verb import Verb
 @click.option("--m", type=int, help="Intervals of the semi-discretisation reported.")
 @click.option("--order", type=int, default=2, show_default=True, help="Its order: 0, 1 or 2.")
 @click.option("--require-stable", is_flag=True, help="Exit with 3 if it is not stable, or refused.")
+@bit_law_options
 @trials_option("none")
 @root_output_options
 def analyze_command(
@@ -42,6 +45,9 @@ def analyze_command(
     k2: str | None,
     m: int | None,
     order: int,
+    bit_law: str,
+    drop: str | None,
+    decay: str | None,
     trials: str,
     require_stable: bool,
     prove: bool,
@@ -65,14 +71,19 @@ def analyze_command(
     tried = wants_trials(trials)
     where = read_point(point)
     from drillctrl.designs.design import analyze
+    from drillctrl.drilling.case import as_case
 
+    law = read_bit_law(bit_law, drop, decay, where)
     if structure is not None and are_drives([structure]):
-        turned = driven_case(where, structure, k1, k2, tried)
+        turned = driven_case(where, structure, (k1, k2), tried, law)
         result = analyze(turned, m=m, order=order)
     else:
         scales = scales_at(where, structure)
         gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
-        result = analyze(where, structure, *gains, m=m, order=order, trials=tried)
+        case = as_case(where)
+        assert case.plant is not None
+        case = as_case(where, replace(case.plant, bit=law))
+        result = analyze(case, structure, *gains, m=m, order=order, trials=tried)
     deliver_roots(result, prove, as_json, out, plot)
     if require_stable and (not result.stable or result.verdict.refused):
         raise click.exceptions.Exit(NOT_STABILISED)

@@ -15,6 +15,7 @@ from drillctrl.cli.output import check_figure, json_text, write_figure, writing
 from drillctrl.cli.verb import naming
 
 if TYPE_CHECKING:
+    from drillctrl.drilling.bit_rock import BitRock
     from drillctrl.drilling.case import Case
     from drillctrl.drilling.point import OperatingPoint, RigPoint
 
@@ -63,7 +64,11 @@ def refuse_drive_options(options: Mapping[str, Any]) -> None:
 
 
 def driven_case(
-    where: OperatingPoint | RigPoint, structure: str, k1: str | None, k2: str | None, tried: bool
+    where: OperatingPoint | RigPoint,
+    structure: str,
+    gains: tuple[str | None, str | None],
+    tried: bool,
+    bit: BitRock,
 ) -> Case:
     """Return the case of a rig that is turned by a drive under a law.
 
@@ -73,10 +78,12 @@ def driven_case(
         Where it drills.
     structure : str
         The law.
-    k1, k2 : str or None
-        Gains of a PI law on the top's angle and speed; without them its rule's.
+    gains : (str or None, str or None)
+        K1 of a PI law on the top's angle and speed, without it its rule's; and K2.
     tried : bool
         Whether trial runs are wanted.
+    bit : BitRock
+        What the bit meets.
 
     Raises
     ------
@@ -91,6 +98,7 @@ def driven_case(
     from drillctrl.strings.drives import drive_control, given_control, machine_of
     from drillctrl.strings.rig import StringRig
 
+    k1, k2 = gains
     if not isinstance(where, RigPoint):
         raise InputError("--structure", structure, "used with --rig: it turns a string")
     if k2 is not None:
@@ -104,12 +112,12 @@ def driven_case(
     else:
         scales = gain_scales(soft_torque(), top_drive_plant(1.0), where.rig)
         with naming("--K1", "K1"):
-            gains = read_gains("K1", k1, scales)
-            assert gains is not None
+            read = read_gains("K1", k1, scales)
+            assert read is not None
             assert scales is not None
-            si = [gain * scale for gain, (scale, _) in zip(gains, scales, strict=False)]
+            si = [gain * scale for gain, (scale, _) in zip(read, scales, strict=False)]
             control = given_control(structure, where.rig, si[0], si[1])
-    return as_case(where, driven_plant(where.rig, control))
+    return as_case(where, driven_plant(where.rig, control, bit))
 
 
 def _check_options() -> None:

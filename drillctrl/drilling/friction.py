@@ -10,6 +10,14 @@ from drillctrl.drilling.bit_rock import BitRock, Contact, Load, PaperLaw, Rates
 from drillctrl.drilling.coefficients import Coefficients
 
 
+class FreeBit(BitRock):
+    """A bit off the rock: no weight, no torque, whatever it does."""
+
+    def load(self, c: Coefficients, contact: Contact, rates: Rates, q: Any) -> Load:
+        """Return nothing."""
+        return Load(ca.SX(0), ca.SX(0))
+
+
 class Stribeck(BitRock):
     """The paper's law with a torque that falls as the bit turns faster.
 

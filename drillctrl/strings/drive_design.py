@@ -20,8 +20,9 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
+from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
-from drillctrl.strings.slopes import lowest_impedance, mode_bands
+from drillctrl.strings.slopes import drive_is_stable, lowest_impedance, mode_bands
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.search import spread_points
 
@@ -334,6 +335,8 @@ def dynamic_drive_control(
     -------
     DriveControl
         ``dynamic-N``, the best that was found; no order does worse than one of two states less.
+        Where a string is damped so little that high modes make all of these unstable, it is
+        soft torque.
     """
     n = checked_integer("order", order, 0, 4)
     error = checked_number("length_error", length_error, 0.0, 0.5)
@@ -349,7 +352,11 @@ def dynamic_drive_control(
     for grown in range(n % 2, n + 1, 2):
         family = _Family(grown, line.wave_impedance, rate, machine)
         known = _best(family, _Slopes(family, loops), known)[None, :]
-    return DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
+    found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
+    if drive_is_stable(line, found):
+        return found
+    soft = soft_torque_control(machine, line.wave_impedance, float(modes[0]))
+    return replace(found, speed=soft.speed, torque=soft.torque)
 
 
 def _best(family: _Family, goal: _Slopes, known: FloatArray) -> FloatArray:

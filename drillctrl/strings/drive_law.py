@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.drive import TopDrive
@@ -172,7 +173,7 @@ def companion(law: Transfer) -> tuple[FloatArray, FloatArray, FloatArray, float]
     return a, b, (above - through * below)[:0:-1], through
 
 
-def driven_plant(rig: StringRig, control: DriveControl) -> Plant:
+def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = None) -> Plant:
     """Return the plant of a rig that is turned by a drive under a law.
 
     Parameters
@@ -181,6 +182,8 @@ def driven_plant(rig: StringRig, control: DriveControl) -> Plant:
         The string, its bit and rock.
     control : DriveControl
         The drive with its law, which need not be that of the rig.
+    bit : BitRock, optional
+        The bit–rock law, the paper's without it.
 
     Returns
     -------
@@ -197,4 +200,4 @@ def driven_plant(rig: StringRig, control: DriveControl) -> Plant:
     if machine.encoder:
         blocks += [Filtered(name, machine.encoder / time) for name in ("phi", "dphi")]
     blocks.append(DriveLaw(control, time, rig.torsional_stiffness, ratio))
-    return paper_plant(string=PipeString(rig.string), blocks=tuple(blocks))
+    return paper_plant(bit, PipeString(rig.string), blocks=tuple(blocks))

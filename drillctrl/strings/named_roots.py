@@ -36,26 +36,28 @@ class NamedRoot:
     ----------
     mode : Mode
         Whose frequency, top held and bit free, is the nearest; see `string_modes`.
-    value : complex
-        1/s, imag > 0.
+    value : complex or None
+        1/s, imag > 0; None where cutting or the drive damps the mode until nothing swings.
     critical_slope : float or None
         By which the torque of a bit that is otherwise free may fall with its speed, N m s/rad;
         of torsional modes.
     """
 
     mode: Mode
-    value: complex
+    value: complex | None
     critical_slope: float | None
 
     @property
     def frequency(self) -> float:
-        """Of its modulus, Hz."""
+        """Of its modulus, Hz; of the mode with its top held where nothing swings."""
+        if self.value is None:
+            return self.mode.frequency
         return abs(self.value) / (2.0 * math.pi)
 
     @property
-    def damping_ratio(self) -> float:
-        """Share of critical; negative where it grows."""
-        return -self.value.real / abs(self.value)
+    def damping_ratio(self) -> float | None:
+        """Share of critical; negative where it grows, None where nothing swings."""
+        return None if self.value is None else -self.value.real / abs(self.value)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields."""
@@ -71,7 +73,9 @@ class NamedRoot:
     @property
     def text(self) -> str:
         """Name, frequency, damping and critical slope."""
-        told = f"{self.mode.name}: {self.frequency:.4g} Hz, {1e2 * self.damping_ratio:.3g} %"
+        ratio = self.damping_ratio
+        damped = "absorbed" if ratio is None else f"{1e2 * ratio:.3g} %"
+        told = f"{self.mode.name}: {self.frequency:.4g} Hz, {damped}"
         if self.critical_slope is None:
             return told
         return f"{told}, critical slope {self.critical_slope:.4g} N·m·s"
@@ -111,8 +115,8 @@ class NamedRoots:
     @property
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
-        texts = [root.text for root in self.roots]
-        named = list(zip(["Modes", *[""] * (len(texts) - 1)], texts, strict=True))
+        named = [("Modes", "the least damped root of each, damping in % of critical")]
+        named += [("", root.text) for root in self.roots]
         if self.control is None:
             return named
         return [("Drive", self.control.name), *named]
@@ -198,8 +202,8 @@ def _with_feedback(
 
 def _by_mode(
     loop: ExactLoop, modes: tuple[Mode, ...], *, axial: bool
-) -> list[tuple[Mode, complex]]:
-    """Return modes of a kind with the least damped root of each, 1/s."""
+) -> list[tuple[Mode, complex | None]]:
+    """Return modes of a kind with the least damped root of each, 1/s, if any swings."""
     held = 2.0 * np.pi * np.array([mode.frequency for mode in modes])
     edges = np.concatenate([[0.0], 0.5 * (held[1:] + held[:-1])])
     edges = np.append(edges, held[-1] + (held[-1] - edges[-1]))
@@ -211,11 +215,11 @@ def _by_mode(
     roots = roots[own < other] if axial else roots[other <= own]
     roots = roots * loop.rate
     roots = roots[(roots.imag > 0.0) & (np.abs(roots.real) < 0.999 * np.abs(roots))]
-    found = []
+    found: list[tuple[Mode, complex | None]] = []
     for mode, low, high in zip(modes, edges[:-1], edges[1:], strict=True):
         here = roots[(np.abs(roots) > low) & (np.abs(roots) <= high)]
-        if here.size:
-            found.append((mode, complex(here[np.argmax(here.real / np.abs(here))])))
+        least = complex(here[np.argmax(here.real / np.abs(here))]) if here.size else None
+        found.append((mode, least))
     return found
 
 

@@ -16,11 +16,13 @@ from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_rules import drive_poles
-from drillctrl.strings.elements import elements, free_modes
+from drillctrl.strings.elements import ELEMENT_LENGTH, elements, free_modes
 from drillctrl.strings.line import Line
 from drillctrl.strings.winding import zeros_right_of
 
 _HALVINGS = 50
+# Samples up to the first mode's frequency; crossings closer together are missed.
+_PER_MODE = 400.0
 # Growth, 1/s, from which a drive counts as unstable: a string that turns freely has a root at 0.
 _GROWTH = 1e-4
 # Share of J ω that the drive's feedback still has where nothing above needs to be looked at.
@@ -147,16 +149,13 @@ def sign_changes(
 
 def mode_bands(line: Line, count: int) -> tuple[FloatArray, FloatArray]:
     """Return the first frequencies of torsion, (count,), and where each one's band ends, Hz."""
-    chain = elements(line)
-    known = free_modes(chain, min(count + 1, chain.diagonal.shape[1] - 2)).frequencies
-    if known.size <= count:
-        raise InputError("modes", count, f"at most {known.size - 1}")
+    # A short string needs short elements for as many modes.
+    chain = elements(line, min(ELEMENT_LENGTH, line.length / (20.0 * count)))
+    known = free_modes(chain, count + 1).frequencies
     return known[:count], 0.5 * (known[1:] + known[:-1])
 
 
-def mode_slopes(
-    line: Line, control: DriveControl | None, count: int = 4, step: float = 1e-3
-) -> tuple[ModeSlope, ...]:
+def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tuple[ModeSlope, ...]:
     """Return the critical slope of each of the first modes of torsion.
 
     Of a drive that is unstable by itself they say nothing: see `drive_is_stable`.
@@ -169,11 +168,10 @@ def mode_slopes(
         Of the drive; None for an imposed speed.
     count : int
         Number of modes, 1 to 20.
-    step : float
-        As of `critical_slopes`.
     """
     checked_integer("modes", count, 1, 20)
     modes, ends = mode_bands(line, count)
+    step = float(modes[0]) / _PER_MODE
     crossings = critical_slopes(line, control, float(ends[-1]), step)
     most = lowest_impedance(line)
     found, low = [], 0.0

@@ -189,6 +189,18 @@ def test_second_order_stands_twice_what_soft_torque_does(second_order):
     assert drive_delay_margin(LONG.torsion, second_order) > 0.01
 
 
+def test_where_no_dynamic_law_is_stable_it_is_soft_torque():
+    """A lossless string under a late drive: its high modes grow with any that does more."""
+    late = DriveMachine(1500.0, 30e3, 0.05, 0.01, 0.005)
+    line = dataclasses.replace(LONG, damping=Damping(0.0, 0.0, 0.0)).torsion
+    law = dynamic_drive_control(line, late, 2)
+    assert (law.name, law.machine) == ("dynamic-2", late)
+    first = mode_slopes(line, None, 1)[0].mode_frequency
+    soft = soft_torque_control(late, PIPE, first)
+    assert law.impedance(3j) == pytest.approx(soft.impedance(3j), rel=1e-4)
+    assert count_growing(line, law) == 0
+
+
 def test_second_order_by_roots_of_finite_elements(second_order):
     line = LONG.torsion
     for mode in mode_slopes(line, second_order, 4):

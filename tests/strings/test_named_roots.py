@@ -4,13 +4,19 @@ import dataclasses
 import json
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from drillctrl import (
+    BitRock,
     DriveMachine,
+    FreeBit,
     InputError,
+    Load,
+    PaperLaw,
     RigPoint,
+    Stribeck,
     Transfer,
     as_case,
     characteristic_roots,
@@ -23,6 +29,7 @@ from drillctrl import (
 from drillctrl.cli.drives import driven_case
 from drillctrl.spectrum import characteristic
 from drillctrl.strings.drive_law import companion, driven_plant, without_integral
+from drillctrl.strings.drive_roots import drive_roots
 from drillctrl.strings.exact import exact_loop
 from drillctrl.strings.named_roots import named_roots
 from tests.strings.finite_drive import root_near
@@ -123,9 +130,10 @@ def test_analyze_tells_modes_and_reflection(capsys):
     rig = string_preset("vertical-3000")
     where = RigPoint(rig, 120 * RPM, 10 * M_PER_H)
     given = f"{-ki} N*m/rad, {-kp} N*m*s/rad"
-    case = driven_case(where, "soft-torque", given, None, False)
-    label, told = named_roots(case).lines[1]
-    assert label == "Modes"
+    case = driven_case(where, "soft-torque", (given, None), False, PaperLaw())
+    lines = named_roots(case).lines
+    assert [label for label, _ in lines[:2]] == ["Drive", "Modes"]
+    told = lines[2][1]
     assert told.startswith(f"1st torsional: {first['frequency']:.4g} Hz")
     assert told.endswith(f"critical slope {first['critical_slope']:.4g} N·m·s")
 
@@ -148,6 +156,55 @@ def test_what_does_not_fit_a_drive_is_refused(capsys, arguments, message):
     code, said, error = run(capsys, *arguments)
     assert (code, said) == (2, "")
     assert message in error.splitlines()[-1]
+
+
+def test_a_free_bit_and_one_whose_torque_falls():
+    """Free: the roots of string and drive alone; falling: over its critical slope a mode grows."""
+    rig, control, _ = turned("soft-torque", LATE)
+    point = RigPoint(rig, 120 * RPM, 10 * M_PER_H)
+    free = named_roots(as_case(point, driven_plant(rig, control, FreeBit())))
+    known = {round(r.frequency, 6): r for r in drive_roots(rig.string.torsion, control, 5.0)}
+    for root in free.roots[1:4]:
+        assert known[round(root.frequency, 6)].damping_ratio == pytest.approx(root.damping_ratio)
+    second = free.roots[1]
+    # No weight, no wear: what is left of the law is the fall.
+    for share, grows in ((0.9, False), (1.1, True)):
+        decay = 2.0
+        drop = share * second.critical_slope * decay * math.exp(4.0 * math.pi / decay)
+        scaled = {"drop": drop / rig.torsional_stiffness, "decay": decay * rig.time_scale}
+        law = FallOnly(**scaled)
+        found = named_roots(as_case(point, driven_plant(rig, control, law)))
+        assert (found.roots[1].damping_ratio < 0.0) == grows
+
+
+class FallOnly(BitRock):
+    parameters = Stribeck.parameters
+    quantities = Stribeck.quantities
+
+    def load(self, c, contact, rates, q):
+        return Load(ca.SX(0), q.drop * ca.exp(-rates.rotary / q.decay))
+
+
+def test_the_law_of_the_bit_on_the_command_line(capsys):
+    point = ("--rig", "paper-string", *RIG[2:])
+    code, said, _ = run(capsys, *point, "--bit-law", "none", "--json")
+    assert code == 0
+    fields = json.loads(said)
+    assert fields["modes"][0]["frequency"] == pytest.approx(0.448, abs=2e-3)
+    falling = ("--bit-law", "stribeck", "--drop", "20 kN*m", "--decay", "10 rad/s")
+    code, said, _ = run(capsys, *point, *falling, "--json")
+    assert code == 0
+    # 2000 exp(−4 π/10) N m s exceeds what the first mode stands.
+    assert json.loads(said)["modes"][0]["damping_ratio"] < 0.0
+    for wrong, message in (
+        (("--bit-law", "stone"), "--bit-law"),
+        (("--drop", "2 kN*m"), "--drop"),
+        (("--bit-law", "stribeck", "--drop", "2"), "--drop"),
+        (("--bit-law", "stribeck", "--decay", "0 rpm"), "--decay"),
+    ):
+        code, said, error = run(capsys, *point, *wrong)
+        assert (code, said) == (2, "")
+        assert message in error
 
 
 def test_a_case_of_something_else_has_no_names():
