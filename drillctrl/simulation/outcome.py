@@ -86,7 +86,7 @@ def figures(run: Simulation) -> Figures:
         return Figures(broken, None, None, None, largest)
     end = float(run.times[-1])
     since = 0.75 * end
-    tail = run.on_steps(_PER_STEP, since)
+    tail = run.on_steps(_PER_STEP, since, ("x", "dx", "dtheta", "contact"))
     speed = run.point.omega0 + tail.dtheta
     mean = float(np.trapezoid(speed, tail.times)) / (end - since)
     stuck = sum(max(0.0, b - max(a, since)) for a, b in run.phases("stuck")) / (end - since)
@@ -160,7 +160,7 @@ def _settles(run: Simulation, tail: Motion) -> bool:
     Rates, because positions go on where the drive was changed.
     """
     end = float(run.times[-1])
-    third = run.on_steps(3, 0.5 * end)
+    third = run.on_steps(3, 0.5 * end, ("dx", "dtheta"))
     before = third.times < 0.75 * end
     whole = run.motion
     for name in ("dx", "dtheta"):
