@@ -108,7 +108,7 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
     motion = run.motion if motion is None else motion
     weight, torque = run.steady_load
     p = run.point
-    if run.status == Status.DONE and run.model == "nonlinear":
+    if run.status in (Status.DONE, Status.REVERSED) and run.model == "nonlinear":
         # Of a linear motion, which swings to both sides, the mean says nothing.
         mean = float(np.trapezoid(motion.x, motion.times)) / max(float(run.times[-1]), 1e-300)
         weight += p.eta**2 * max(0.0, -mean)
