@@ -27,7 +27,8 @@ class OperatingPoint:
     psi : float
         ψ ≥ 0, cutting coefficient.
     eta : float
-        η > 0, ratio of the axial to the torsional natural frequency.
+        η ≥ 0, ratio of the axial to the torsional natural frequency; 0 means that the hook
+        load is imposed, and the rate of penetration follows.
     xi, kappa : float
         ξ, κ ≥ 0, axial and torsional damping ratio.
     blades : int
@@ -61,7 +62,7 @@ class OperatingPoint:
         check("omega0", 0.0, 1e6, open_low=True)
         check("delta0", 0.0, 1e6)
         check("psi", 0.0, 1e6)
-        check("eta", 0.0, 1e6, open_low=True)
+        check("eta", 0.0, 1e6)
         check("xi", 0.0, 1e3)
         check("kappa", 0.0, 1e3)
         object.__setattr__(self, "blades", checked_integer("blades", self.blades, 1, 100))

@@ -10,9 +10,10 @@ from drillctrl.simulation.kernel import data
 
 # Multiples of a rig's own scale of speed that no bounded motion of it reaches.
 BEYOND = 20.0
-# And of the speed with which a string springs back that the drive alone has wound up: a bit
-# that bounces as it falls behind the feed gets about three times more from the turning rock.
-_WOUND = 10.0
+# And of the speed with which a string springs back that the drive alone has wound up, axial
+# and torsional: a bit that bounces as it falls behind the feed gets about three times more from
+# the rock that turns under it.
+_WOUND = (10.0, 3.0)
 
 
 def rate_scales(point: OperatingPoint, weight: float, torque: float) -> tuple[float, float]:
@@ -53,4 +54,4 @@ def rate_bounds(
     scales = np.array(rate_scales(point, *(strength * steady).tolist()))
     size = stiffness * float(abs(start).sum())
     at_first = BEYOND * (scales + more + size)
-    return np.column_stack([at_first, _WOUND * stiffness * fastest]).ravel()
+    return np.column_stack([at_first, np.array(_WOUND) * stiffness * fastest]).ravel()

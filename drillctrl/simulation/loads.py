@@ -45,7 +45,7 @@ def loads(run: Trace) -> Loads:
         Of any model; that of the linear one are those of small motion.
     """
     end = float(run.times[-1])
-    tail = run.on_steps(_PER_STEP, 0.75 * end)
+    tail = run.on_steps(_PER_STEP, 0.75 * end, ("weight_on_bit", "torque_on_bit"))
     span = float(tail.times[-1] - tail.times[0])
     means: list[float | None] = []
     peaks: list[float | None] = []

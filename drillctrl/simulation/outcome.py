@@ -86,7 +86,7 @@ def figures(run: Simulation) -> Figures:
         return Figures(broken, None, None, None, largest)
     end = float(run.times[-1])
     since = 0.75 * end
-    tail = run.on_steps(_PER_STEP, since)
+    tail = run.on_steps(_PER_STEP, since, ("x", "dx", "dtheta", "contact"))
     speed = run.point.omega0 + tail.dtheta
     mean = float(np.trapezoid(speed, tail.times)) / (end - since)
     stuck = sum(max(0.0, b - max(a, since)) for a, b in run.phases("stuck")) / (end - since)
@@ -108,7 +108,7 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
     motion = run.motion if motion is None else motion
     weight, torque = run.steady_load
     p = run.point
-    if run.status == Status.DONE and run.model == "nonlinear":
+    if run.status in (Status.DONE, Status.REVERSED) and run.model == "nonlinear":
         # Of a linear motion, which swings to both sides, the mean says nothing.
         mean = float(np.trapezoid(motion.x, motion.times)) / max(float(run.times[-1]), 1e-300)
         weight += p.eta**2 * max(0.0, -mean)
@@ -160,7 +160,7 @@ def _settles(run: Simulation, tail: Motion) -> bool:
     Rates, because positions go on where the drive was changed.
     """
     end = float(run.times[-1])
-    third = run.on_steps(3, 0.5 * end)
+    third = run.on_steps(3, 0.5 * end, ("dx", "dtheta"))
     before = third.times < 0.75 * end
     whole = run.motion
     for name in ("dx", "dtheta"):

@@ -229,7 +229,8 @@ def simulate(
         # Heard between two calls of the march, which leave all in place.
         outcome, used = data.INTERRUPTED, int(standing.ints[march.STEPS])
     elapsed = time.perf_counter() - started
-    history = resized(standing.history, used, used)
+    # A view: what was never written to takes no memory.
+    history = data.History(*(array[:used] for array in standing.history))
     run = Simulation(
         case=case,
         controller=controller,

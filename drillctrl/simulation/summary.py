@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.simulation.kernel import data
 from drillctrl.simulation.status import Status
 from drillctrl.simulation.trace import Motion, Trace
 
@@ -85,11 +86,13 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
     """
     end = float(simulation.times[-1])
     since = 0.75 * end
-    inputs = simulation.input_names
+    # Without feedback they are 0, and to work them out costs more than the run.
+    inputs = simulation.input_names if simulation.settings.whole[data.FEEDBACK] else ()
     if simulation.steps == 0:
-        tail = run = simulation.at([0.0])
+        tail = run = driven = simulation.at([0.0])
     else:
-        run = simulation.on_steps(PER_STEP, names=("x", "theta", *inputs))
+        run = simulation.on_steps(PER_STEP, names=("x", "theta"))
+        driven = simulation.on_steps(PER_STEP, names=inputs) if inputs else run
         # The run is in order of time; its tail starts with the step that holds `since`.
         tail = simulation.on_steps(PER_STEP, since, ("x", "theta", "dtheta", "delay", "contact"))
     settled = all(
@@ -107,7 +110,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         axial_min=_extreme(simulation, tail, "x", least=True),
         axial_max=_extreme(simulation, tail, "x"),
         delay_max=_extreme(simulation, tail, "delay"),
-        max_abs_u=max((float(abs(getattr(run, name)).max()) for name in inputs), default=0.0),
+        max_abs_u=max((float(abs(getattr(driven, name)).max()) for name in inputs), default=0.0),
         lost_contact=not bool(tail.contact.all()),
         axial_stick_fraction=_share(simulation, "held", since, end),
         events=len(simulation.events),

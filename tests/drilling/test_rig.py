@@ -128,7 +128,7 @@ def test_a_bad_toml_file_is_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("field", "value"),
     [("omega0", 0.0), ("omega0", math.nan), ("psi", -1.0), ("blades", 0), ("delta0", -0.1),
-     ("blades", 2.5), ("xi", math.inf), ("eta", 0.0), ("omega0", True), ("psi", "14")],
+     ("blades", 2.5), ("xi", math.inf), ("eta", -1.0), ("omega0", True), ("psi", "14")],
 )  # fmt: skip
 def test_bad_groups_are_refused(field, value):
     good = {"omega0": 10.0, "delta0": 1.0, "psi": 14.0}

@@ -120,3 +120,11 @@ def test_a_bit_off_the_rock_for_turns_on_end_finds_the_face_again():
         assert depth == pytest.approx(run.point.blades * face.height[0], rel=1e-6, abs=1e-6)
         passes.append(face.passes[0])
     assert max(passes) > 10
+
+
+def test_a_bit_that_falls_behind_and_turns_back_has_turned_back():
+    where = at(table1(), 60.959438957012026, 10.35077280309002)
+    kick = {"dx": 0.018859656668560366, "dtheta": 0.2244900799947762}
+    run = simulate(where, duration=170.0, initial=kick, rtol=1e-5, cutting="single")
+    assert run.status == "reverse rotation"
+    assert figures(run).outcome == "turns-back"

@@ -84,18 +84,26 @@ def evaluate(settings, history, steps, places, times, wanted):
     # At rest the velocity is known; its interpolation is off by rounding.
     standing = rates((0.0, 0.0, 0.0, 0.0), settings.bit)
     linear = settings.whole[LINEAR] == 1
+    # States are on the steps; all else has to be worked out.
+    stored = True
+    for c in range(wanted.shape[0]):
+        which = wanted[c]
+        stored = stored and (which == C_CONTACT or C_STATES <= which < C_STATES + n)
+    mode = mode_on(settings, history, 0)
     for i in range(times.shape[0]):
         j, t = places[i], times[i]
-        mode = mode_on(settings, history, j)
+        if not stored:
+            mode = mode_on(settings, history, j)
         s = (t - history.real[j, START]) / history.real[j, LENGTH]
         recall(settings, history, j, s, y)
         if not linear:
-            if mode.torsion == STUCK:
+            if history.whole[j, TORSION] == STUCK:
                 y[3] = -standing[1]
-            if mode.contact == 1 and mode.axial == HELD:
+            if history.whole[j, CONTACT] == 1 and history.whole[j, AXIAL] == HELD:
                 y[1] = -standing[0]
-        rate_of_change(settings, history, steps, mode, t, y, out, probe)
-        if linear:
+        if not stored:
+            rate_of_change(settings, history, steps, mode, t, y, out, probe)
+        if linear and not stored:
             speeds = rates((y[0], y[1], y[2], y[3]), settings.bit)
             probe[P_WEIGHT], probe[P_TORQUE] = load((probe[P_DEPTH], 1.0, 1.0), speeds, settings.q)
         for c in range(wanted.shape[0]):
@@ -121,5 +129,5 @@ def evaluate(settings, history, steps, places, times, wanted):
             elif which == C_TORQUE:
                 result[c, i] = probe[P_TORQUE]
             elif which == C_CONTACT:
-                result[c, i] = mode.contact
+                result[c, i] = history.whole[j, CONTACT]
     return result
