@@ -20,16 +20,13 @@ from drillctrl.designs.motion_design import fits_motion, motion_design, why_not_
 from drillctrl.designs.result import Analysis, Design, analysis_fields, assess
 from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.worst_case import WorstCase
-from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.structures import as_structure
 from drillctrl.simulation.controller import Controller
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.synthesis import problem
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
-
-# States of a plant whose motion is measured without being asked.
-_FEW = 12
 
 
 def design(
@@ -118,7 +115,7 @@ def design(
     result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
     value = problem.reported_value(family, objective, solution.gains)
-    if free and trials and not result.stable and _few(case) and fits_motion(case, chosen):
+    if free and trials and not result.stable and fits_motion(case, chosen):
         made = on_motion(Drilling(), why_not_smooth(result))
         return replace(made, elapsed_seconds=time.perf_counter() - began)
     if trials:
@@ -134,11 +131,6 @@ def design(
         optimality=solution.optimality,
         evaluations=solution.evaluations,
     )
-
-
-def _few(case: Case) -> bool:
-    """Whether a plant has so few states that its motion is measured within seconds."""
-    return case.plant is not None and len(case.plant.state_names) <= _FEW
 
 
 def _meets(

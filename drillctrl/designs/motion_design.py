@@ -15,6 +15,7 @@ from drillctrl.designs.drilling import (
     ASKED,
     Drilling,
     OnMotion,
+    Swing,
     followed_swings,
     largest_growth,
     measured_swings,
@@ -25,13 +26,17 @@ from drillctrl.motion.loop import torsional_system
 from drillctrl.simulation.controller import Controller
 from drillctrl.synthesis.objectives import Requirements
 
+# States of a plant whose motion is measured without being asked.
+_FEW = 12
 # Of the bounds, within which gains are looked for.
 SHARES = tuple(2.0**-k for k in range(8))
 
 
 def fits_motion(case: Case, structure: FeedbackStructure) -> bool:
-    """Whether a structure closes a torsional loop about the axial orbit of a case."""
-    if case.point is None or not case.point.delta0 > 0.0:
+    """Whether a structure closes a torsional loop about an axial orbit that is soon measured."""
+    if case.plant is None or case.point is None or not case.point.delta0 > 0.0:
+        return False
+    if len(case.plant.state_names) > _FEW:
         return False
     try:
         system = torsional_system(case, 0j, 1.0)
@@ -56,6 +61,7 @@ def motion_design(
     surroundings: Mapping[str, Any],
     workers: int,
     why: str = ASKED,
+    swings: tuple[Swing, ...] | None = None,
 ) -> Design:
     """Return the gains with which torsional swings decay soonest, as far as runs bear it out.
 
@@ -80,6 +86,8 @@ def motion_design(
         Processes.
     why : str
         Why the gains are designed for the motion.
+    swings : tuple of Swing, optional
+        What `measured_swings` returned for the case; it does not depend on the structure.
 
     Raises
     ------
@@ -95,7 +103,8 @@ def motion_design(
         raise InputError("structure", structure.name, wanted)
     Controller(structure, *structure.gains(structure.lower), **surroundings)
     with open_executor(workers, None) as executor:
-        swings = measured_swings(case, objective, executor)
+        if swings is None:
+            swings = measured_swings(case, objective, executor)
         without = largest_growth(swings)
         found = candidates(case, objective, swings, structure, requirements, seed, SHARES)
         if trials:

@@ -12,7 +12,9 @@ import numpy.typing as npt
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
+from drillctrl.designs.drilling import Drilling, Swing, measured_swings
 from drillctrl.designs.margins import point_margins
+from drillctrl.designs.motion_design import fits_motion, motion_design, why_not_smooth
 from drillctrl.designs.result import Analysis
 from drillctrl.designs.robustness import relative_radius
 from drillctrl.designs.trials import uncontrolled_runs
@@ -24,6 +26,7 @@ from drillctrl.simulation.outcome import Figures
 from drillctrl.studies.comparison import OPEN_LOOP, SORTS, Comparison, Row
 from drillctrl.studies.comparison_text import delay_room
 from drillctrl.studies.measures import basin, respond
+from drillctrl.synthesis.objectives import NO_REQUIREMENTS
 
 if TYPE_CHECKING:
     from drillctrl.base.workers import Progress
@@ -47,6 +50,7 @@ def _subjects(
     open_loop = analyze(case)
     subjects: list[tuple[str, Analysis, bool]] = [(OPEN_LOOP, open_loop, False)]
     free: dict[str, Figures] | None = None
+    swings: tuple[Swing, ...] | None = None
 
     def tried(candidate: Analysis) -> Analysis:
         nonlocal free
@@ -67,7 +71,25 @@ def _subjects(
             for name, limits in (bounds or {}).items()
             if name in ("K1", "K2") or name in chosen.entry_names
         }
-        subjects.append((chosen.name, tried(design(case, chosen, bounds=mine, trials=False)), True))
+        made: Analysis = design(case, chosen, bounds=mine, trials=False)
+        if trials and not made.stable and fits_motion(case, chosen):
+            tell(f"design of {chosen.name} on the motion")
+            swings = measured_swings(case, Drilling()) if swings is None else swings
+            made = motion_design(
+                case,
+                chosen.with_bounds(mine),
+                Drilling(),
+                NO_REQUIREMENTS,
+                seed=0,
+                trials=True,
+                surroundings={},
+                workers=1,
+                why=why_not_smooth(made),
+                swings=swings,
+            )
+        else:
+            made = tried(made)
+        subjects.append((chosen.name, made, True))
     for label, structure, K1, K2 in given:
         tell(f"analysis of {label}")
         subjects.append((label, tried(analyze(case, structure, K1, K2)), False))

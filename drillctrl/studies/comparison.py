@@ -12,7 +12,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
-from drillctrl.designs.result import Analysis
+from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.robustness.loop_margins import LoopMargins
@@ -50,6 +50,19 @@ SORTS = {
     "stable_area": True,
     "formation_change": True,
 }
+
+
+def _largest_swing(result: Analysis) -> float | None:
+    """Return the largest swing that trial runs end in; None where one breaks off."""
+    swings = [trial.controlled.swing for trial in result.trials]
+    known = [swing for swing in swings if swing is not None]
+    return max(known) if known and len(known) == len(swings) else None
+
+
+def _torsional_growth(result: Analysis) -> float | None:
+    """Return the largest growth rate of torsional swings, of a design on the motion."""
+    on_motion = result.on_motion if isinstance(result, Design) else None
+    return None if on_motion is None else on_motion.growth
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +127,8 @@ class Row:
             "K2": design.K2.ravel().tolist(),
             "designed": self.designed,
             "stable": design.stable,
+            "largest_swing": _largest_swing(design),
+            "torsional_growth": _torsional_growth(design),
             "spectral_abscissa": alpha,
             "decay_time": -1.0 / alpha if design.stable else None,
             "stability_radius": self.stability_radius.value,

@@ -24,6 +24,8 @@ COLUMNS = (
     ("Δψ", "formation_change", "{:.0%}"),
     ("area", "stable_area", "{:.4g}"),
     ("ratio", "area_ratio", "{:.3g}"),
+    ("swing", "largest_swing", "{:.3g}"),
+    ("torsion", "torsional_growth", "{:.3g}"),
     ("trials", "recommended", "{}"),
 )
 LEGEND = (
@@ -34,7 +36,8 @@ LEGEND = (
     "torsional stick at the end; basin: multiple of the disturbance that still settles (up to "
     "16); Δψ: relative change of the rock's strength that destabilises; area, ratio: where these "
     "gains are stable, and against no control; trials: what runs from three starts beside no "
-    "control say of the gains. "
+    "control say of the gains; swing: the largest of the bit's speed that they end in; torsion: "
+    "growth rate of torsional swings on the motion that is drilled with, of gains for that motion. "
     "–: does not exist or does not settle."
 )
 
@@ -110,7 +113,7 @@ def sentences(rows: Sequence[Fields]) -> list[str]:
         return [*told, "None of these gains is offered."]
     best, *others = offered
     if not best["stable"]:
-        text = "None of these gains stabilises this point"
+        text = "None of these gains makes smooth drilling stable"
         return [*told, f"{text}; the summary of a design says what would."]
     found = told
     for other in others:

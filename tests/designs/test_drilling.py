@@ -16,6 +16,7 @@ from drillctrl import (
     RigPoint,
     as_case,
     cli,
+    compare,
     design,
     feed,
     preset_structure,
@@ -184,7 +185,20 @@ def test_an_unstable_point_is_designed_for_its_motion(monkeypatch):
     assert smooth.on_motion is None
 
 
+def test_structures_are_compared_on_the_motion(monkeypatch):
+    monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (0.125,))
+    monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
+    found = compare(at(120, 50), ("pd",), region=None, duration=20.0)
+    row = next(row for row in found.rows if row.label == "pd")
+    fields = row.to_dict()
+    assert fields["recommended"] is True
+    assert fields["largest_swing"] < 0.08
+    assert fields["torsional_growth"] < -0.2
+    assert "good" in found.summary()
+
+
 def test_nothing_is_recommended_where_nothing_helps(capsys, monkeypatch):
+    monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
     monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (0.125,))
     point = ("--rig", "table1", "--speed", "60 rpm", "--rop", "20 m/h")
     aims = ("--objective", "drilling", "--kick", "0.9", "--limit", "0.9 kN*m")
