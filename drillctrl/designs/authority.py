@@ -21,8 +21,8 @@ from drillctrl.designs.drilling import (
     cost_of_gains,
     swing_families,
 )
-from drillctrl.designs.trials import MORE_STARTS, STARTS, Trial, trial_run
-from drillctrl.designs.verdict import FAILURES, Verdict, judge
+from drillctrl.designs.trials import MORE_STARTS, STARTS, UNDER_WAY, Trial, trial_run
+from drillctrl.designs.verdict import FAILURES, Verdict, judge, with_engagement
 from drillctrl.drilling.case import Case
 from drillctrl.motion.torsion import torsional_modes
 from drillctrl.simulation.controller import Controller
@@ -84,7 +84,7 @@ class Candidate:
     def score(self) -> tuple[bool, int, float]:
         """What runs showed, the worse the larger: harm, how it ended, largest swing."""
         assert self.verdict is not None
-        ends = [trial.controlled for trial in self.trials]
+        ends = [trial.controlled for trial in self.trials if trial.start not in UNDER_WAY]
         largest = max(np.inf if end.swing is None else end.swing for end in ends)
         severity = max(FAILURES.get(end.outcome, 0) for end in ends)
         return (self.verdict.harm, severity, largest)
@@ -160,9 +160,9 @@ def tried(
 ) -> list[Candidate]:
     """Return the candidates after trial runs, the one to take first.
 
-    A candidate counts as what its worst start leads to, and no better than the one with about
-    twice its gains, so that it stands that; among those alike the one of fastest decay is
-    taken. The first has been tried from more starts, and at the other points of the objective
+    A candidate counts as what its worst start leads to; among those alike as what the one with
+    about twice its gains leads to, so that it stands that; among those the one of fastest decay
+    is taken. The first has been tried from more starts, and at the other points of the objective
     it does no harm either.
     """
 
@@ -192,7 +192,7 @@ def tried(
         best = order[0]
         before = known[best].trials
         if len(before) > len(STARTS) or known[best].harmful:
-            return [known[i] for i in order]
+            break
         (more,) = judged(case, [known[best]], MORE_STARTS)
         known[best] = verdict(known[best], before + more)
         for there in cases_around(case, objective)[1:]:
@@ -203,6 +203,16 @@ def tried(
             if elsewhere.harm:
                 reason = f"{_place(there)}: {elsewhere.reason}"
                 known[best] = replace(known[best], verdict=replace(elsewhere, reason=reason))
+    first = known[best]
+    if first.verdict is not None and first.verdict.recommended and not _engaged(first):
+        (runs,) = judged(case, [first], UNDER_WAY)
+        known[best] = replace(first, verdict=with_engagement(first.verdict, runs))
+    return [known[i] for i in order]
+
+
+def _engaged(candidate: Candidate) -> bool:
+    """Whether control was switched on under way already."""
+    return any(trial.start in UNDER_WAY for trial in candidate.trials)
 
 
 def _free(task: tuple[Case, Start]) -> tuple[str, Figures]:
@@ -229,15 +239,15 @@ def _try(
 def _ranked(known: Sequence[Candidate]) -> list[int]:
     """Return the places of the candidates, the best first; those with more gains come before."""
 
-    def rank(i: int) -> tuple[bool, bool, int, float, float]:
-        harm, severity, swing = known[i].score
-        if i:
-            # What twice the gains would lead to.
-            _, more_severity, more_swing = known[i - 1].score
-            severity, swing = max(severity, more_severity), max(swing, more_swing)
-        # In steps, so that what is alike is decided by the decay.
-        alike = float(np.ceil(swing / _ALIKE)) if np.isfinite(swing) else swing
-        return harm, not known[i].met, severity, alike, known[i].growth
+    def alike(i: int) -> tuple[int, float]:
+        # In steps, so that what is alike is decided by what comes next.
+        _, severity, swing = known[i].score
+        return severity, float(np.ceil(swing / _ALIKE)) if np.isfinite(swing) else swing
+
+    def rank(i: int) -> tuple[bool, bool, tuple[int, float], tuple[int, float], float]:
+        # Beside it what about twice the gains would lead to.
+        more = alike(max(i - 1, 0))
+        return known[i].score[0], not known[i].met, alike(i), more, known[i].growth
 
     return sorted(range(len(known)), key=rank)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from drillctrl.drilling.case import Case, Where, as_case
@@ -30,6 +30,7 @@ _RTOL, _FINER = 1e-7, 1e-9
 _FEW, _MANY = 20_000, 60_000
 
 
+_UNDER_WAY = "control that is switched on in the midst of what follows a kick"
 # A bit that starts from rest or from stick says less of gains than of the rig.
 STARTS = tuple(start_named(name) for name in ("small", "kick", "back"))
 # Irregular motions depend on how they start more than on the gains: what is chosen by runs is
@@ -40,6 +41,11 @@ MORE_STARTS = (
     Start("strong", "steady", 1.0, 0.7, "a kick forward by 70 % of the speed"),
     Start("nudge", "steady", 0.2, 0.25, "a kick forward by a quarter of the speed"),
     Start("nudge back", "steady", 0.2, -0.25, "a kick back by a quarter of the speed"),
+)
+
+# Gains that keep a motion quiet need not bring it to rest once the bit sticks and slips.
+UNDER_WAY = tuple(
+    Start(f"under way {time:.0f}", "steady", 0.5, 0.5, _UNDER_WAY, time) for time in (60.0, 100.0)
 )
 
 
@@ -87,11 +93,13 @@ def trial_run(case: Case, controller: Controller | None, start: Start) -> Figure
 
 def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -> Simulation:
     _, point = case.physics("a trial run")
+    if controller is not None and start.activation > controller.activation:
+        controller = replace(controller, activation=start.activation)
     for most in (_FEW, _MANY):
         run = simulate(
             case,
             controller,
-            duration=trial_duration(point),
+            duration=start.activation + trial_duration(point),
             scenario=start.scenario(point),
             rtol=rtol,
             max_steps=most,

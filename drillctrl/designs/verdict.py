@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -138,6 +138,20 @@ def judge(
     rest = next(trial for trial in runs if trial not in settled)
     small = f"the motion settles from {settled[0].start.text}, but not from every start"
     return Verdict(True, f"{small}: {_beside(rest)}", runs)
+
+
+def with_engagement(verdict: Verdict, runs: Sequence[Trial]) -> Verdict:
+    """Return a verdict with trials in which control is switched on under way.
+
+    Where they do worse than no control, gains are to be switched on while the bit swings little;
+    the verdict says so.
+    """
+    trials = (*verdict.trials, *runs)
+    worse = next((text for trial in runs if (text := _harm(trial)) is not None), None)
+    if worse is None or not verdict.recommended:
+        return replace(verdict, trials=trials)
+    reason = f"{verdict.reason}; but switch them on while the bit swings little: {worse}"
+    return replace(verdict, reason=reason, trials=trials)
 
 
 def _but(runs: Sequence[Trial]) -> str:

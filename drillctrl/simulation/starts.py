@@ -35,6 +35,8 @@ class Start:
         Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
     text : str
         In words.
+    activation : float
+        When control is switched on, in trials of gains.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Start:
     feed: float = 0.0
     speed: float = 0.0
     text: str = ""
+    activation: float = 0.0
 
     def initial(self, point: OperatingPoint) -> dict[str, float]:
         """Return the perturbation by state name."""
