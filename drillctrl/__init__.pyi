@@ -181,6 +181,9 @@ from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
+from .studies.vibration import VibrationMap as VibrationMap
+from .studies.vibration import vibration_map as vibration_map
+from .studies.vibration_values import Severity as Severity
 from .synthesis.objectives import Exact as Exact
 from .synthesis.objectives import HInfinity as HInfinity
 from .synthesis.objectives import Requirements as Requirements

@@ -28,6 +28,8 @@ RESULTS = (
         "motion.swing",
         "studies.campaign",
         "studies.comparison",
+        "studies.vibration",
+        "studies.vibration_values",
     ),
 )
 

@@ -20,7 +20,7 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.loops import gains_along, loop_arrays
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.drilling.steady import rig_point_at_weight_on_bit
+from drillctrl.drilling.steady import rig_point_at_weight_on_bit, steady_state
 from drillctrl.drilling.structures import as_structure
 
 AxisLike = Axis | Sequence[object]
@@ -58,6 +58,30 @@ class Plane:
     def rig_point(self) -> RigPoint | None:
         """The rig behind it, if one was given."""
         return self.case.rig_point
+
+    def value_of(self, name: str) -> float:
+        """Return the value that the point has of what may be an axis, in the axis' unit.
+
+        Raises
+        ------
+        InputError
+            If it has none: it is no axis of the case, or ξ and κ differ where both are asked.
+        """
+        point, rig_point = self.point, self.rig_point
+        if name in RIG_AXES and rig_point is not None:
+            value = {
+                "speed": rig_point.rotary_speed,
+                "rop": rig_point.penetration_rate,
+                "wob": steady_state(rig_point).weight_on_bit if name == "wob" else 0.0,
+                "rock_strength": rig_point.rig.rock_strength,
+            }[name]
+            return value / to_si_factor(name)
+        if name == "damping" and point is not None and point.xi == point.kappa:
+            return point.xi
+        known = self.case.parameters
+        if name not in known:
+            raise InputError("axis", name, f"one of {', '.join(known)}")
+        return known[name]
 
     def _parameters(self, values: dict[str, FloatArray], count: int) -> dict[str, FloatArray]:
         """Return the parameters that vary, by name; those of a rig as the groups they move."""

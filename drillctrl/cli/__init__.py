@@ -16,6 +16,7 @@ from drillctrl.cli.bit import bit_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
+from drillctrl.cli.map import map_command
 from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.rig import rig_command
 from drillctrl.cli.simulate import simulate_command
@@ -38,6 +39,7 @@ for _command in (
     design_command,
     analyze_command,
     chart_command,
+    map_command,
     compare_command,
     simulate_command,
     bit_command,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.axes import read_axis, with_axes
 from drillctrl.cli.gains import Scales, read_bounds, read_gains, scales_at
 from drillctrl.cli.output import (
     check_figure,
@@ -26,47 +27,7 @@ if TYPE_CHECKING:
     from drillctrl.charts.volume import StabilityVolume
     from drillctrl.drilling.point import OperatingPoint, RigPoint
 
-_UNITS = {"speed": "rpm", "rop": "m/h", "wob": "kN"}
 MESH_ENDINGS = (".vtk", ".ply", ".stl")
-
-
-def read_axis(option: str, text: str) -> tuple[str, object, object]:
-    """Return name and limits from a text such as ``omega0=0.5:25`` or ``rop=0:40 m/h``.
-
-    Raises
-    ------
-    InputError
-        If the text has not that form.
-    """
-    name, equals, interval = text.partition("=")
-    low, colon, high = (part.strip() for part in interval.partition(":"))
-    if not (equals and colon and low and high):
-        raise InputError(option, text, "of the form omega0=0.5:25 or 'speed=30:200 rpm'")
-    unit = " ".join(high.split()[1:])
-    if unit and " " not in low:
-        low = f"{low} {unit}"
-    limits: list[object] = []
-    for part in (low, high):
-        try:
-            limits.append(float(part))
-        except ValueError:
-            limits.append(part)
-    return name.strip(), limits[0], limits[1]
-
-
-def _with_axes(point: dict[str, Any], *axes: tuple[str, object, object]) -> dict[str, Any]:
-    """Return the options of the point, those that are axes at the upper end of theirs."""
-    given = dict(point)
-    for name, _, high in axes:
-        if given.get("rig") is None or name not in ("speed", "rop", "wob"):
-            continue
-        other = {"rop": "wob", "wob": "rop"}.get(name)
-        if other is not None and point.get(other) is not None:
-            raise InputError(f"--{other}", point[other], f"left out where {name} is an axis")
-        # Two axes that contradict each other are told as such later.
-        if given[name] is None and (other is None or given[other] is None):
-            given[name] = high if isinstance(high, str) else f"{high} {_UNITS[name]}"
-    return given
 
 
 @click.command(name="chart", cls=Verb)
@@ -135,7 +96,7 @@ def chart_command(
     check_folder("--out", out)
     check_figure(plot)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
-    where = read_point(_with_axes(point, x, y))
+    where = read_point(with_axes(point, x, y))
     scales = scales_at(where, structure)
     x, y = _gain_axis("--x", x, structure, scales), _gain_axis("--y", y, structure, scales)
     gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from drillctrl.base import units
-from drillctrl.base.text import finite_or_none
+from drillctrl.base.text import finite_or_none, set_out
 from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
-from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines, set_out
+from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines
 from drillctrl.robustness.margins import ParameterMargin
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.synthesis.boundary import BoundaryDecision, decide

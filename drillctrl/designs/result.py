@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.text import set_out
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.fields import design_fields, result_fields
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER, analyze_loop, discretised_radius
 from drillctrl.designs.mode_shift import ModeShift, mode_shifts
 from drillctrl.designs.values import AnalysisValues, DesignValues, closed_loop
 from drillctrl.designs.verdict import try_gains
-from drillctrl.designs.words import design_lines, result_lines, set_out
+from drillctrl.designs.words import design_lines, result_lines
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures

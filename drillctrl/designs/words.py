@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from drillctrl.base import units
 from drillctrl.designs.drilling import ASKED, Drilling
@@ -22,12 +21,6 @@ Lines = list[tuple[str, str]]
 _SHOWN = 0.05
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
 _VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
-
-
-def set_out(lines: Sequence[tuple[str, str]]) -> str:
-    """Return labels and texts side by side."""
-    width = max(len(label) for label, _ in lines) + 2
-    return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
 
 
 def result_lines(result: AnalysisValues) -> Lines:

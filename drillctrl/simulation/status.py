@@ -69,3 +69,5 @@ _BY_SEVERITY = (
     Outcome.TURNS_BACK,
     Outcome.DIVERGES,
 )
+
+OUTCOME_NAMED = {str(outcome): outcome for outcome in Outcome}

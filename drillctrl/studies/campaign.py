@@ -18,9 +18,9 @@ from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import write_text
 from drillctrl.base.tableio import csv_text
-from drillctrl.base.workers import Progress, spread_out
-from drillctrl.drilling.case import Case
+from drillctrl.base.workers import Progress
 from drillctrl.simulation.controller import Controller
+from drillctrl.studies.tasks import controller_at, run_tasks
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.table import GainTable
@@ -259,12 +259,12 @@ def campaign(
             raise InputError("largest", largest, f"such that θ' ≥ −ω0 = {-point.omega0:g}")
     trials = [
         Trial(
-            index, case, _controller_at(controller, case), kick, steps, float(largest),
+            index, case, controller_at(controller, case), kick, steps, float(largest),
             float(sharpness), duration, cutting, rtol,
         )
         for index, case in enumerate(grid.cases)
     ]  # fmt: skip
-    found = _run(trials, executor, checkpoint, progress)
+    found = run_tasks(try_point, trials, executor, checkpoint, progress)
 
     def numbers(name: str) -> FloatArray:
         return np.array([entry[name] for entry in found], dtype=float)
@@ -281,40 +281,9 @@ def campaign(
     )
 
 
-def _run(
-    trials: list[Trial],
-    executor: Executor | None,
-    checkpoint: Checkpoint | None,
-    progress: Progress | None,
-) -> list[dict[str, Any]]:
-    """Return the result of each trial, in their order."""
-    found: dict[int, dict[str, Any]] = {}
-    if checkpoint is not None:
-        for trial in trials:
-            known = checkpoint.find(trial.key)
-            if known is not None:
-                found[trial.index] = {**known, "index": trial.index}
-    missing = {trial.index: trial for trial in trials if trial.index not in found}
-    for entry in spread_out(executor, try_point, list(missing.values())):
-        found[entry["index"]] = entry
-        if checkpoint is not None:
-            checkpoint.keep(missing[entry["index"]].key, entry)
-        if progress is not None:
-            progress("simulate", len(found) - len(trials) + len(missing), len(missing))
-    return [found[trial.index] for trial in trials]
-
-
 def _checked_sizes(sizes: Sequence[float]) -> tuple[float, ...]:
     """Return the sizes, or refuse them."""
     steps = tuple(checked_number("sizes", size, 0.0, 1e6, open_low=True) for size in sizes)
     if not steps or any(b <= a for a, b in itertools.pairwise(steps)):
         raise InputError("sizes", list(steps), "at least one, rising")
     return steps
-
-
-def _controller_at(controller: Controller | GainTable | None, case: Case) -> Controller | None:
-    """Return what closes the loop at an operating point."""
-    if not isinstance(controller, GainTable):
-        return controller
-    K1, K2 = controller.gains_at(*(case.parameters[name] for name in controller.grid.names))
-    return Controller(controller.structure, K1[0], K2[0], plant=controller.grid.plant)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from drillctrl.delay.closing import close_loop
-from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.basin import basin_edge
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.status import Status
-from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.studies.tasks import linear_abscissa, task_key
 
 OUTCOMES = (
     "settled",
@@ -76,22 +73,8 @@ class Trial:
     def key(self) -> str:
         """Hash of all that the result depends on."""
         apart = ("controller", "case")
-        parts: list[Any] = [getattr(self, f.name) for f in fields(self) if f.name not in apart]
-        plant, point = self.case.physics("a campaign")
-        parts += [plant.text, point]
-        if self.controller is not None:
-            feedback = self.controller.feedback
-            assert isinstance(feedback, FeedbackStructure)
-            parts += [feedback.inputs, feedback.outputs]
-            parts += [array.tolist() for array in self.controller.gain_sets()]
-            parts.append(self.controller.delays(0.0).tolist())
-            own = ("feedback", "K1", "K2", "schedule", "plant")
-            parts += [
-                getattr(self.controller, f.name)
-                for f in fields(self.controller)
-                if f.name not in own
-            ]
-        return hashlib.sha256(repr(parts).encode("utf-8")).hexdigest()
+        settings = (getattr(self, f.name) for f in fields(self) if f.name not in apart)
+        return task_key(self.case, self.controller, *settings)
 
 
 def try_point(trial: Trial) -> dict[str, Any]:
@@ -120,19 +103,6 @@ def try_point(trial: Trial) -> dict[str, Any]:
         "settling_times": [time for _, time in tried],
         "basin": basin,
     }
-
-
-def linear_abscissa(case: Case, controller: Controller | None) -> float:
-    """Return α of the linear loop with an ideal controller."""
-    if controller is None:
-        return spectral_abscissa(case.system(()))
-    feedback = controller.feedback
-    assert isinstance(feedback, FeedbackStructure)
-    _, point = case.physics("a campaign")
-    loop = close_loop(
-        case.system(feedback.inputs), feedback, controller.K1, controller.K2, delay=point.delay
-    )
-    return spectral_abscissa(loop)
 
 
 def _basin(trial: Trial, alpha: float, duration: float, outcomes: list[str]) -> list[float | None]:

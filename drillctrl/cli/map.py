@@ -1,0 +1,230 @@
+"""`drillctrl map`."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.cli.axes import read_counted_axis, with_axes
+from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.progress import open_progress
+from drillctrl.cli.scenario import (
+    SURROUNDINGS,
+    controller_options,
+    read_controller,
+    read_duration,
+    read_starts,
+    read_surroundings,
+)
+from drillctrl.cli.verb import Verb, naming
+
+if TYPE_CHECKING:
+    from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.drilling.point import OperatingPoint, RigPoint
+    from drillctrl.simulation.controller import Controller
+    from drillctrl.tables.table import GainTable
+
+_RIG_AXES = ("speed=50:180 rpm", "rop=5:50 m/h")
+_AXES = ("omega0=4:24", "delta0=0.5:12")
+_COUNTS = (15, 12)
+
+
+@click.command(name="map", cls=Verb)
+@point_options
+@click.option(
+    "--x",
+    "x_axis",
+    metavar="NAME=LOW:HIGH[:COUNT]",
+    help="Such as 'speed=50:180:15 rpm', which is the default with a rig; else omega0=4:24.",
+)
+@click.option(
+    "--y",
+    "y_axis",
+    metavar="NAME=LOW:HIGH[:COUNT]",
+    help="Such as 'rop=5:50:12 m/h', 'wob=5:40 kN', 'rock_strength=20:120 MPa'; delta0=0.5:12.",
+)
+@click.option(
+    "--refine",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="TIMES",
+    help="Halve the spacing this often where the outcome changes.",
+)
+@controller_options
+@click.option(
+    "--starts",
+    default="small,kick,back",
+    show_default=True,
+    metavar="NAMES",
+    help="Each point is judged by the worst: 'all' or some of small,kick,back,rest,stick.",
+)
+@click.option(
+    "--duration",
+    default="200",
+    show_default=True,
+    metavar="TIME",
+    help="Of each run; dimensionless, with a rig also '70 s'.",
+)
+@click.option("--workers", type=int, help="Processes (default: one for each core).")
+@click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster, such as tcp://host:8786.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--out", type=click.Path(), help="Write FILE.csv or .json; resumes when killed.")
+@click.option("--plot", type=click.Path(), help="Draw the map: FILE.png, .svg, .pdf.")
+@click.option(
+    "--show",
+    default="outcome,swing",
+    show_default=True,
+    metavar="NAMES",
+    help="Drawn: outcome, swing, stick_fraction, off_rock_fraction, feed, weight_ratio.",
+)
+def map_command(
+    x_axis: str | None,
+    y_axis: str | None,
+    refine: int,
+    starts: str,
+    duration: str,
+    workers: int | None,
+    scheduler: str | None,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    show: str,
+    **options: Any,
+) -> None:
+    """Map stick-slip and bit bounce over what a driller sets, by nonlinear runs.
+
+    Where gains are given the map without control stands beside that with them. The line is the
+    edge of stable drilling by linear theory.
+
+    \b
+    Axes: omega0, delta0, psi, eta, xi, kappa, damping;
+    with --rig speed (rpm), rop (m/h), wob (kN), rock_strength (MPa).
+
+    \b
+    Examples:
+      drillctrl map --rig table1 --speed "120 rpm" --rop "20 m/h" --refine 0 --plot map.png
+      drillctrl map --rig table1 --x "speed=60:160:6 rpm" --y "wob=10:40:5 kN" --refine 0 \\
+          --structure pd --K1 "-2 kN*m/rad,-400 N*m*s/rad" --limit "5 kN*m" --out map.csv
+      drillctrl map --x omega0=4:20:6 --y delta0=0.5:6:5 --psi 14 --refine 0
+
+    With --out a run that was killed goes on where it was when it is started again.
+    """
+    check_folder("--out", out)
+    check_figure(plot)
+    shown = tuple(part.strip() for part in show.split(","))
+    if workers is not None:
+        checked_integer("workers", workers, 1, 1024)
+        if scheduler is not None:
+            raise InputError("workers", workers, "left out with --scheduler, which has its own")
+    usual = _AXES if options["rig"] is None else _RIG_AXES
+    x, across = read_counted_axis("--x", x_axis or usual[0], _COUNTS[0])
+    y, up = read_counted_axis("--y", y_axis or usual[1], _COUNTS[1])
+    _check_weight(options, x[0], y[0])
+    given = with_axes(options, x, y)
+    where = read_point({name: given[name] for name in options})
+    from drillctrl.base.checkpoint import Checkpoint
+    from drillctrl.base.workers import open_executor
+    from drillctrl.drilling.case import as_case
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.simulation.compile import is_compiled
+    from drillctrl.simulation.starts import possible_starts
+    from drillctrl.simulation.structure import structure_of
+    from drillctrl.studies.vibration import check_map_path, vibration_map
+    from drillctrl.studies.vibration_figure import check_shown
+
+    if out is not None:
+        with naming("--out", "path"):
+            check_map_path(out)
+    with naming("--show", "quantities"):
+        check_shown(shown)
+    rig = where.rig if isinstance(where, RigPoint) else None
+    controller, surroundings = _read_controller(options, where)
+    names = read_starts(starts, possible_starts(where))
+    length = read_duration(duration, rig)
+    if not is_compiled(structure_of(as_case(where)).physics):
+        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
+    with (
+        open_executor(workers or _cores(), scheduler) as executor,
+        nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,
+        open_progress() as progress,
+        naming("--x or --y", "counts"),
+    ):
+        result = vibration_map(
+            where,
+            x,
+            y,
+            controller,
+            counts=(across, up),
+            refine=refine,
+            starts=names,
+            duration=length,
+            mark=_is_typed(options, x[0], y[0]),
+            surroundings=surroundings,
+            executor=executor,
+            checkpoint=checkpoint,
+            progress=progress,
+        )
+    if out is not None:
+        path = out
+        writing("--out", path, lambda: result.save(path))
+    if checkpoint is not None:
+        _finish(checkpoint)
+    if plot is not None:
+        name = None if options["rig"] is None else Path(options["rig"]).stem
+        write_figure(plot, result.plot(shown, name))
+    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+
+
+def _check_weight(options: dict[str, Any], *axes: str) -> None:
+    """Refuse a weight on bit that is no axis: the feed that gives it differs over the map."""
+    if options["wob"] is not None and "wob" not in axes:
+        wanted = "an axis (--y 'wob=…'), or --rop instead: over the map the feed is held"
+        raise InputError("--wob", options["wob"], wanted)
+
+
+def _is_typed(options: dict[str, Any], *axes: str) -> bool:
+    """Whether the operating point was given by what the axes are over."""
+    return all(options.get(name) is not None for name in axes if name != "rock_strength")
+
+
+def _read_controller(
+    options: dict[str, Any], where: OperatingPoint | RigPoint
+) -> tuple[Controller | GainTable | None, dict[str, Any] | None]:
+    """Return what closes the loop, and what surrounds the gains of a table."""
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.simulation.scenario import Scenario
+
+    rig = where.rig if isinstance(where, RigPoint) else None
+    groups = where.operating_point() if isinstance(where, RigPoint) else where
+    if options["table"] is None:
+        return read_controller(options, where, groups, Scenario(), 1.0, rig), None
+    for name in ("structure", "k1", "k2"):
+        if options[name] is not None:
+            option = {"k1": "--K1", "k2": "--K2"}.get(name, "--structure")
+            raise InputError(option, options[name], "left out where --table gives the gains")
+    for name, plain in (("activation", None), ("noise", ""), ("delay", "fixed")):
+        if options[name] != plain:
+            raise InputError(f"--{name}", options[name], "left out with --table on a map")
+    from drillctrl.tables.files import load_table
+
+    surroundings = {name: options[name] for name in SURROUNDINGS}
+    return load_table(options["table"]), read_surroundings(surroundings, rig)
+
+
+def _finish(checkpoint: Checkpoint) -> None:
+    left = checkpoint.remove()
+    if left:
+        click.echo(
+            f"drillctrl: note: {checkpoint.path} keeps {left} points of another command", err=True
+        )

@@ -1,0 +1,236 @@
+"""Figures of a vibration map. They take arrays and know no results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
+from drillctrl.base.figure import new_figure
+from drillctrl.charts.figure import axis_text
+from drillctrl.charts.plane import Plane
+from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
+from drillctrl.studies.lattice import Cell, Node, fill
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Outcome → what an engineer calls it and its colour, from the mildest to the worst.
+OUTCOMES = {
+    Outcome.SETTLES: ("smooth drilling", "#E8F1F8"),
+    Outcome.ORBIT: ("swings without stick", "#9CCBEA"),
+    Outcome.BOUNCES: ("bit bounces", "#F0E442"),
+    Outcome.STICK_SLIP: ("stick-slip", "#E69F00"),
+    Outcome.LATE: ("falls behind the feed", "#D55E00"),
+    Outcome.UNDECIDED: ("undecided", "#DDDDDD"),
+    Outcome.STALLS: ("bit stands still", "#CC79A7"),
+    Outcome.TURNS_BACK: ("bit turns backwards", "#8C4A75"),
+    Outcome.DIVERGES: ("grows without bound", "#444444"),
+}
+# Quantity → text of the colour bar, colours, and its range, which ends where values do; None
+# for no other end. The swing of a bit that hardly turns may be any number.
+_COLOURED: dict[str, tuple[str, str, float, float | None]] = {
+    "swing": ("stick-slip index, swing of the bit's speed (–)", "YlOrRd", 0.0, 2.0),
+    "stick_fraction": ("time in torsional stick (%)", "YlOrRd", 0.0, None),
+    "off_rock_fraction": ("time off the rock (%)", "YlOrRd", 0.0, None),
+    "feed": ("rate of penetration kept (%)", "YlOrRd_r", 0.0, 100.0),
+    "weight_ratio": ("mean over steady weight on bit (–)", "YlOrRd", 1.0, None),
+}
+_PERCENT = ("stick_fraction", "off_rock_fraction", "feed")
+SHOWN = ("outcome", *_COLOURED)
+_BROKEN = "#BBBBBB"
+
+
+class Drawn(NamedTuple):
+    """One column of a figure.
+
+    Attributes
+    ----------
+    title : str
+        What closes the loop.
+    columns : mapping
+        Quantity → entries at the nodes; ``spectral_abscissa``; and ``boundary``, curves or None.
+    """
+
+    title: str
+    columns: Mapping[str, Any]
+
+
+def check_shown(quantities: Sequence[str]) -> None:
+    """Raise `InputError` unless they are some of `SHOWN`, each once."""
+    for name in quantities:
+        if name not in SHOWN or list(quantities).count(name) > 1:
+            raise InputError("quantities", name, f"among {', '.join(SHOWN)}, each once")
+    if not quantities:
+        raise InputError("quantities", "none", f"among {', '.join(SHOWN)}")
+
+
+def plot_map(
+    plane: Plane,
+    shape: tuple[int, int],
+    nodes: Sequence[Node],
+    cells: Sequence[Cell],
+    drawn: Sequence[Drawn],
+    quantities: Sequence[str],
+    *,
+    marked: tuple[float, float] | None,
+    title: str,
+) -> Figure:
+    """Draw quantities over two axes, one row each, with one column for each controller.
+
+    Parameters
+    ----------
+    plane : Plane
+        The two axes.
+    shape, nodes, cells
+        Of the lattice; see `VibrationMap`.
+    drawn : sequence of Drawn
+        Columns.
+    quantities : sequence of str
+        Some of `SHOWN`.
+    marked : (float, float) or None
+        The operating point.
+    title : str
+        Above all.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity.
+    """
+    check_shown(quantities)
+    figure = new_figure(1.6 + 4.2 * len(drawn) + 1.2, 3.6 * len(quantities) + 0.8)
+    grid = figure.subplots(len(quantities), len(drawn), squeeze=False, sharex=True, sharey=True)
+    x = np.linspace(plane.x.low, plane.x.high, shape[0])
+    y = np.linspace(plane.y.low, plane.y.high, shape[1])
+
+    def whole(values: Any) -> FloatArray:
+        return fill(shape, cells, nodes, np.array(values, dtype=float))
+
+    for row, name in zip(grid, quantities, strict=True):
+        if name == "outcome":
+            _outcomes(row, x, y, [whole(_ranks(each)) for each in drawn])
+        else:
+            factor = 100.0 if name in _PERCENT else 1.0
+            fields = [factor * whole(each.columns[name]) for each in drawn]
+            _coloured(row, x, y, fields, *_COLOURED[name])
+    for row in grid:
+        for ax, each in zip(row, drawn, strict=True):
+            _overlay(ax, x, y, whole(each.columns["spectral_abscissa"]), each, marked)
+            ax.set_xlim(plane.x.low, plane.x.high)
+            ax.set_ylim(plane.y.low, plane.y.high)
+    for ax in grid[-1]:
+        ax.set_xlabel(axis_text(plane.x))
+    for ax in grid[:, 0]:
+        ax.set_ylabel(axis_text(plane.y))
+    for ax, each in zip(grid[0], drawn, strict=True):
+        ax.set_title(each.title, fontsize="medium")
+    _legend(figure, grid, "outcome" in quantities, marked is not None)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _ranks(drawn: Drawn) -> list[int]:
+    order = list(OUTCOMES)
+    return [order.index(OUTCOME_NAMED[word]) for word in drawn.columns["outcome"]]
+
+
+def _outcomes(
+    row: npt.NDArray[Any], x: FloatArray, y: FloatArray, fields: list[FloatArray]
+) -> None:
+    """Draw what becomes of the bit: a colour each."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    colours = ListedColormap([colour for _, colour in OUTCOMES.values()])
+    norm = BoundaryNorm(np.arange(len(OUTCOMES) + 1) - 0.5, len(OUTCOMES))
+    for ax, field in zip(row, fields, strict=True):
+        ax.pcolormesh(x, y, field.T, shading="nearest", cmap=colours, norm=norm)
+
+
+def _coloured(
+    row: npt.NDArray[Any],
+    x: FloatArray,
+    y: FloatArray,
+    fields: list[FloatArray],
+    label: str,
+    colours: str,
+    low: float,
+    high: float | None,
+) -> None:
+    """Draw a number on one scale in all columns, grey where it could not be measured."""
+    known = np.concatenate([field[np.isfinite(field)] for field in fields])
+    largest = float(known.max(initial=low))
+    top = max(largest if high is None else min(largest, high), low + 1e-3)
+    picture = None
+    for ax, field in zip(row, fields, strict=True):
+        ax.set_facecolor(_BROKEN)
+        picture = ax.pcolormesh(
+            x, y, np.ma.masked_invalid(field.T), shading="nearest", cmap=colours, vmin=low, vmax=top
+        )
+    row[0].figure.colorbar(
+        picture, ax=list(row), label=label, extend="max" if largest > top else "neither"
+    )
+
+
+def _overlay(
+    ax: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    alpha: FloatArray,
+    drawn: Drawn,
+    marked: tuple[float, float] | None,
+) -> None:
+    """Draw the edge of the linear theory, and the operating point."""
+    boundary = drawn.columns["boundary"]
+    if boundary is not None:
+        for curve in boundary:
+            ax.plot(curve[:, 0], curve[:, 1], color="black", linewidth=1.3)
+    elif np.nanmin(alpha) < 0.0 < np.nanmax(alpha):
+        ax.contour(x, y, alpha.T, levels=[0.0], colors="black", linewidths=1.3)
+    if marked is not None:
+        ax.plot(*marked, "*", color="white", markeredgecolor="black", markersize=13, clip_on=False)
+
+
+def _legend(figure: Figure, grid: npt.NDArray[Any], outcomes: bool, marked: bool) -> None:
+    """Say below the pictures what colours and marks mean, as far as they occur."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = []
+    if outcomes:
+        for k, (name, colour) in enumerate(OUTCOMES.values()):
+            if any(_occurs(ax, k) for ax in grid.ravel()):
+                handles.append(Patch(facecolor=colour, edgecolor="black", lw=0.4, label=name))
+    if any(_is_grey(ax) for ax in grid.ravel()):
+        handles.append(Patch(facecolor=_BROKEN, label="not measured: the run broke off"))
+    handles.append(Line2D([], [], color="black", label="edge of linear stability"))
+    if marked:
+        handles.append(
+            Line2D(
+                [], [], color="white", marker="*", markeredgecolor="black", markersize=12,
+                linestyle="none", label="operating point",
+            )
+        )  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize="small")
+
+
+def _mesh(ax: Axes) -> Any:
+    return ax.collections[0]
+
+
+def _occurs(ax: Axes, rank: int) -> bool:
+    """Whether an outcome is drawn."""
+    from matplotlib.colors import BoundaryNorm
+
+    mesh = _mesh(ax)
+    return isinstance(mesh.norm, BoundaryNorm) and bool((mesh.get_array() == rank).any())
+
+
+def _is_grey(ax: Axes) -> bool:
+    """Whether something could not be measured."""
+    return bool(np.ma.getmaskarray(_mesh(ax).get_array()).any())

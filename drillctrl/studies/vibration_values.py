@@ -1,0 +1,184 @@
+"""What is known over a vibration map, and the table and fields that hold it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.arrays import FloatArray
+from drillctrl.charts.plane import Plane
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.status import Outcome
+from drillctrl.studies.lattice import Cell, Node, fine_shape
+from drillctrl.studies.vibration_point import QUANTITIES
+from drillctrl.tables.table import GainTable
+
+
+@dataclass(frozen=True, eq=False)
+class Severity:
+    """How hard the bit vibrates at each point: the worst of all starts.
+
+    Attributes
+    ----------
+    outcomes : str array, (q,)
+        What becomes of the start that ends worst; words as in `Outcome`.
+    starts : str array, (q,)
+        Which start that is.
+    swing : array, (q,)
+        Stick-slip index, (max − min)/(2 mean) of the bit's speed. This and what follows is NaN
+        where a start ends before it can be measured.
+    stick_fraction, off_rock_fraction : array, (q,)
+        Share of the time in torsional stick, and off the rock.
+    feed : array, (q,)
+        Rate of penetration over that of the top end.
+    weight_ratio : array, (q,)
+        Mean weight on bit over that of steady drilling.
+    spectral_abscissa : array, (q,)
+        α of the linear loop with an ideal controller.
+    boundary : tuple of array, (k, 2), or None
+        Where linear theory has the edge of stable drilling; None where only α is known.
+    """
+
+    outcomes: npt.NDArray[np.str_]
+    starts: npt.NDArray[np.str_]
+    swing: FloatArray
+    stick_fraction: FloatArray
+    off_rock_fraction: FloatArray
+    feed: FloatArray
+    weight_ratio: FloatArray
+    spectral_abscissa: FloatArray
+    boundary: tuple[FloatArray, ...] | None
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the entries of each point by name; None for no number."""
+        numbers = (*QUANTITIES, "spectral_abscissa")
+        columns: dict[str, list[Any]] = {"outcome": self.outcomes.tolist()}
+        for name in numbers:
+            values = getattr(self, name).tolist()
+            columns[name] = [value if np.isfinite(value) else None for value in values]
+        return {**columns, "start": self.starts.tolist()}
+
+    def counts(self) -> dict[str, int]:
+        """Return at how many points each outcome is the worst, from the mildest on."""
+        found = self.outcomes.tolist()
+        return {str(o): found.count(o) for o in sorted(Outcome, key=lambda o: o.severity)}
+
+
+@dataclass(frozen=True, eq=False)
+class MapValues:
+    """What becomes of the bit over two parameters, without control and with it.
+
+    Attributes
+    ----------
+    plane : Plane
+        The two parameters, and all that is fixed.
+    counts : (int, int)
+        Points along each axis before refinement.
+    refine : int
+        How often the spacing was halved where the outcome changes.
+    starts : tuple of str
+        Where the runs begin.
+    nodes : tuple of (int, int)
+        Places of the points on the finest lattice.
+    cells : tuple of Cell
+        Squares between them.
+    uncontrolled : Severity
+        Without control.
+    controlled : Severity or None
+        With the controller, if one was given.
+    controller : Controller, GainTable or None
+        Which.
+    marked : (float, float) or None
+        The operating point on the axes.
+    elapsed_seconds : float
+        Wall time.
+    """
+
+    plane: Plane
+    counts: tuple[int, int]
+    refine: int
+    starts: tuple[str, ...]
+    nodes: tuple[Node, ...]
+    cells: tuple[Cell, ...]
+    uncontrolled: Severity
+    controlled: Severity | None
+    controller: Controller | GainTable | None
+    marked: tuple[float, float] | None
+    elapsed_seconds: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the finest lattice."""
+        return fine_shape(self.counts, self.refine)
+
+    @property
+    def points(self) -> FloatArray:
+        """Values on the axes of all points, in the axes' units, (q, 2)."""
+        places = np.array(self.nodes, dtype=float) / (np.array(self.shape) - 1)
+        low = np.array([self.plane.x.low, self.plane.y.low])
+        return np.asarray(low + places * np.array([self.plane.x.span, self.plane.y.span]))
+
+    @property
+    def structure(self) -> FeedbackStructure | None:
+        """What is fed back."""
+        if isinstance(self.controller, GainTable):
+            return self.controller.structure
+        return None if self.controller is None else self.controller.feedback  # type: ignore[return-value]
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the table by column: axes, what becomes of the bit, and so without control."""
+        x, y = self.points.T
+        first: dict[str, list[Any]] = {
+            self.plane.x.name: x.tolist(),
+            self.plane.y.name: y.tolist(),
+        }
+        free = self.uncontrolled.columns()
+        if self.controlled is None:
+            return {**first, **free}
+        beside = {f"uncontrolled_{name}": values for name, values in free.items()}
+        return {**first, **self.controlled.columns(), **beside}
+
+    def rows(self) -> list[list[Any]]:
+        """Return one row a point, in the order of `columns`."""
+        return [list(row) for row in zip(*self.columns().values(), strict=True)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON types."""
+        axes = {
+            key: {"name": axis.name, "low": axis.low, "high": axis.high, "unit": axis.unit or None}
+            for key, axis in (("x", self.plane.x), ("y", self.plane.y))
+        }
+        severities = {"uncontrolled": self.uncontrolled, "controlled": self.controlled}
+        columns = self.columns()
+        return {
+            "schema": "drillctrl/map/1",
+            "operating_point": asdict(self.plane.case.physics("a map")[1]),
+            "axes": axes,
+            "counts": list(self.counts),
+            "refine": self.refine,
+            "starts": list(self.starts),
+            "marked": None if self.marked is None else list(self.marked),
+            "structure": None if self.structure is None else self.structure.name,
+            **self._gains(),
+            "outcomes": {k: None if s is None else s.counts() for k, s in severities.items()},
+            "boundaries": {k: _boundary(s) for k, s in severities.items()},
+            "rows": [dict(zip(columns, row, strict=True)) for row in self.rows()],
+            "elapsed_seconds": self.elapsed_seconds,
+        }
+
+    def _gains(self) -> dict[str, Any]:
+        """Return the gains, which a table has many of."""
+        if not isinstance(self.controller, Controller):
+            return {"K1": None, "K2": None}
+        _, K1, K2 = self.controller.gain_sets()
+        return {"K1": K1[0].ravel().tolist(), "K2": K2[0].ravel().tolist()}
+
+
+def _boundary(found: Severity | None) -> list[Any] | None:
+    if found is None or found.boundary is None:
+        return None
+    return [curve.tolist() for curve in found.boundary]
