@@ -19,7 +19,6 @@ from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.charts.sweep import sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
-from drillctrl.spectrum.count import count_right_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +36,8 @@ class StabilityChart:
         σ: a place counts as stable where no root lies right of Re s = σ.
     method : str
         ``"delay"``: crossings in closed form along ω0; ``"affine"``: along a parameter in
-        which the characteristic equation is affine; ``"counting"``: roots counted at sample
+        which the characteristic equation is affine; ``"receptance"``: the same from the exact
+        receptances of a string of pipe; ``"counting"``: roots counted at sample
         places, crossings by bisection.
     curves : tuple of Curve
         The boundary of the stable set, with the frequency of the crossing root.
@@ -72,7 +72,7 @@ class StabilityChart:
 
         None where a root lies too near the line to tell.
         """
-        return count_right_of(self.plane.system(x, y), self.level).count
+        return self.plane.unstable_roots(x, y, self.level)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""

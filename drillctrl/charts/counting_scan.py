@@ -76,10 +76,41 @@ def scan_counting(
     line : float
         σ: roots right of it are counted.
     """
-    samples = np.linspace(low, high, _SAMPLES)
-    held = np.repeat(positions, _SAMPLES)
-    counts = count_right(matrices(held, np.tile(samples, positions.size)), line)
-    counts = counts.reshape(positions.size, _SAMPLES)
+    return bisected_lines(
+        lambda held, at: count_right(matrices(held, at), line),
+        lambda held, at: _frequencies(matrices(held, at), line),
+        positions,
+        low,
+        high,
+    )
+
+
+def bisected_lines(
+    count: Callable[[FloatArray, FloatArray], IntArray],
+    frequency: Callable[[FloatArray, FloatArray], FloatArray],
+    positions: FloatArray,
+    low: float,
+    high: float,
+    every: int = _SAMPLES,
+) -> list[ScanLine]:
+    """Return scan lines from counts alone.
+
+    Parameters
+    ----------
+    count : callable
+        Number of roots right of the line at (positions, places along the lines).
+    frequency : callable
+        |Im s| of the root on the line there.
+    positions : array, (N,)
+        The parameter that is held.
+    low, high : float
+        Limits of the other one.
+    every : int
+        Samples of each line.
+    """
+    samples = np.linspace(low, high, every)
+    held = np.repeat(positions, every)
+    counts = count(held, np.tile(samples, positions.size)).reshape(positions.size, every)
     rows, columns = np.nonzero(counts[:, 1:] != counts[:, :-1])
     left, right = samples[columns], samples[columns + 1]
     before, after = counts[rows, columns], counts[rows, columns + 1]
@@ -87,7 +118,7 @@ def scan_counting(
         if not rows.size:
             break
         middle = 0.5 * (left + right)
-        between = count_right(matrices(positions[rows], middle), line)
+        between = count(positions[rows], middle)
         first, second = between != before, between != after
         rows = np.concatenate([rows[first], rows[second]])
         left, right = (
@@ -99,7 +130,7 @@ def scan_counting(
             np.concatenate([between[first], after[second]]),
         )
     at = 0.5 * (left + right)
-    omega = _frequencies(matrices(positions[rows], at), line) if rows.size else at
+    omega = frequency(positions[rows], at) if rows.size else at
     order = np.lexsort((at, rows))
     rows, at, omega, jump = rows[order], at[order], omega[order], (after - before)[order]
     bounds = np.searchsorted(rows, np.arange(positions.size + 1))
