@@ -73,6 +73,15 @@ class Plane:
         return self.case.point
 
     @property
+    def name(self) -> str | None:
+        """What is fed back: the structure, or the law of the top drive; None for neither."""
+        if self.structure is not None:
+            return self.structure.name
+        plant = self.case.plant
+        known = None if plant is None else string_at_bit(plant)
+        return None if known is None or known.control is None else known.control.name
+
+    @property
     def rig_point(self) -> RigPoint | None:
         """The rig behind it, if one was given."""
         return self.case.rig_point
@@ -287,7 +296,6 @@ def make_plane(
 
 def plane_fields(plane: Plane) -> dict[str, Any]:
     """Return what a chart was drawn over."""
-    structure = plane.structure
     axes = {
         key: {"name": axis.name, "low": axis.low, "high": axis.high, "unit": axis.unit or None}
         for key, axis in (("x", plane.x), ("y", plane.y))
@@ -295,7 +303,7 @@ def plane_fields(plane: Plane) -> dict[str, Any]:
     return {
         "operating_point": plane.point and dataclasses.asdict(plane.point),
         "axes": axes,
-        "structure": structure.name if structure else None,
+        "structure": plane.name,
         "K1": plane.K1.ravel().tolist(),
         "K2": plane.K2.ravel().tolist(),
     }

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.charts.affine_scan import affine_lines, find_crossings
@@ -28,7 +29,8 @@ Loads = Callable[[FloatArray, FloatArray], BitLoads]
 _SHARE = 0.37
 # Crossings as far outside the line as it is long are not looked for.
 _MARGIN = 1.0
-_SAMPLES = 33
+_SAMPLES, _HALVINGS = 33, 4
+_TRIED, _STEPS, _NOTHING = 4, 8, 1e-6
 
 
 def is_affine(string: StringAtBit, start: BitLoads, middle: BitLoads, stop: BitLoads) -> bool:
@@ -80,9 +82,73 @@ def scan_string_counting(
     def count(held: FloatArray, at: FloatArray) -> IntArray:
         return count_growing(string, loads(held, at), grid)
 
-    def frequency(held: FloatArray, at: FloatArray) -> FloatArray:
-        s = 1j * grid[1:]
-        size = np.abs(closed(loads(held, at), s, *string.receptances(s)))
-        return np.asarray(grid[1:][np.argmin(size, axis=1)])
+    def settle(
+        held: FloatArray, left: FloatArray, right: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        return _crossed(string, loads, grid, (held, left, right))
 
-    return bisected_lines(count, frequency, positions, low, high, _SAMPLES)
+    return bisected_lines(
+        count, settle, positions, low, high, _SAMPLES, _HALVINGS, edges_alone=True
+    )
+
+
+def _crossed(
+    string: StringAtBit,
+    loads: Loads,
+    grid: FloatArray,
+    intervals: tuple[FloatArray, FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Return where in intervals D vanishes on the axis, and ω there.
+
+    The middle where it is not found: counts tell that it is in between.
+    """
+    held, left, right = intervals
+    middle = 0.5 * (left + right)
+
+    s = 1j * grid[1:]
+    size = np.abs(closed(loads(held, middle), s, *string.receptances(s)))
+    # A root on the axis near by leaves a dip: the deepest few are tried.
+    padded = np.pad(size, ((0, 0), (1, 1)), constant_values=np.inf)
+    dips = np.where((size <= padded[:, :-2]) & (size <= padded[:, 2:]), size, np.inf)
+    order = np.argsort(dips, axis=1)[:, :_TRIED]
+    found = np.zeros(held.size, dtype=bool)
+    best, frequency = middle.copy(), grid[1:][order[:, 0]]
+    for choice in order.T:
+        rest = np.flatnonzero(~found)
+        if not rest.size:
+            break
+        some = tuple(part[rest] for part in intervals)
+        at, omega, good = _newton(string, loads, grid[1:][choice[rest]], some)
+        best[rest[good]], frequency[rest[good]] = at[good], omega[good]
+        found[rest[good]] = True
+    return best, frequency
+
+
+def _newton(
+    string: StringAtBit,
+    loads: Loads,
+    omega: FloatArray,
+    intervals: tuple[FloatArray, ...],
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Return places and ω that Newton's method finds from the middles, and where it does."""
+    held, left, right = intervals
+    at = 0.5 * (left + right)
+    width = right - left
+    step, turn = 1e-5 * width, 1e-7 * (1.0 + omega)
+    three = np.tile(held, 3)
+    for _ in range(_STEPS):
+        places = np.concatenate([at, at + step, at])
+        s = 1j * np.concatenate([omega, omega, omega + turn])[:, None]
+        now, beside, above = np.split(
+            closed(loads(three, places), s, *string.receptances(s))[:, 0], 3
+        )
+        along, up = (beside - now) / step, (above - now) / turn
+        determinant = along.real * up.imag - along.imag * up.real
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved = (now.real * up.imag - now.imag * up.real) / determinant
+            risen = (along.real * now.imag - along.imag * now.real) / determinant
+        fine = np.isfinite(moved) & np.isfinite(risen)
+        at, omega = at - np.where(fine, moved, 0.0), omega - np.where(fine, risen, 0.0)
+        at, omega = np.clip(at, left - width, right + width), np.abs(omega)
+    found = (np.abs(now) < _NOTHING) & (at >= left) & (at <= right)
+    return at, omega, found

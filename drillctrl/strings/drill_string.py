@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass, replace
 
 from drillctrl.base.errors import InputError, checked_number
@@ -12,6 +13,8 @@ from drillctrl.strings.section import Section
 STANDARD_GRAVITY = 9.80665
 DEEPEST, HEAVIEST_MUD = 15e3, 3000.0
 _JOINT = 9.6
+# Of a joint, that is worth a piece of its own.
+_LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -93,8 +96,8 @@ class DrillString:
         Parameters
         ----------
         length : float
-            Of the whole string, m. Joints of the uppermost section change their length by a
-            little where it is no whole number of them.
+            Of the whole string, m. What is no whole joint of the uppermost section hangs above
+            it as a short one, its tool joint as much shorter.
 
         Raises
         ------
@@ -104,8 +107,16 @@ class DrillString:
         length = checked_number("depth", length, self.shallowest, DEEPEST)
         top = self.sections[0]
         left = length - (self.length - top.length)
-        joints = max(1, round(left / top.joint_length)) if top.tool_joint is not None else top.joints
-        return replace(self, sections=(replace(top, length=left, joints=joints), *self.sections[1:]))
+        if top.tool_joint is None:
+            return replace(self, sections=(replace(top, length=left), *self.sections[1:]))
+        joint = top.joint_length
+        whole = max(1, math.floor(left / joint + 1e-9))
+        pipes = [replace(top, length=whole * joint, joints=whole)]
+        share = left / joint - whole
+        if share > _LEAST_SHARE:
+            tool = replace(top.tool_joint, length=share * top.tool_joint.length)
+            pipes.insert(0, replace(top, length=share * joint, joints=1, tool_joint=tool))
+        return replace(self, sections=(*pipes, *self.sections[1:]))
 
     @property
     def mass(self) -> float:
