@@ -203,7 +203,7 @@ class Plane:
         if given:
             points = [found.operating_point() for found in self._rig_points(given, count)]
         rows = np.array([[getattr(p, name) for name in GROUP_NAMES] for p in points], dtype=float)
-        law = {**plant.bit.values, **own}
+        law: dict[str, Any] = {**plant.bit.values, **own}
         more = [np.broadcast_to(law[name], count) for name in plant.bit.values]
         return np.column_stack([rows, *more])
 

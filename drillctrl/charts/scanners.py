@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.charts.affine_scan import scan_affine
 from drillctrl.base.errors import InputError
+from drillctrl.charts.affine_scan import scan_affine
 from drillctrl.charts.axes import STRING_AXES, Axis
 from drillctrl.charts.counting_scan import scan_counting
 from drillctrl.charts.delay_scan import scan_rotary_speed

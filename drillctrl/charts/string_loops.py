@@ -10,9 +10,10 @@ however many modes there are. For the paper's law it is 1 + n (1 − E)(kc gx �
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +34,7 @@ _SLOW = 1e-6
 # Turn of the receptances, and of the delays, from one frequency to the next.
 _TURN, _PHASE = 0.3, 0.4
 _GRID_ROUNDS = 30
-_MOST_TURN, _COUNT_ROUNDS = 1.5, 40
+_MOST_TURN, _COUNT_ROUNDS = 1.2, 40
 _CHUNK = 400_000
 
 
@@ -133,8 +134,8 @@ def closed(loads: BitLoads, s: ComplexArray, gx: ComplexArray, gt: ComplexArray)
     """
     late = np.exp(-loads.delay[:, None] * s)
 
-    def answer(row: int, motion: int) -> ComplexArray | float:
-        whole: ComplexArray | float = 0.0
+    def answer(row: int, motion: int) -> Any:
+        whole: Any = 0.0
         for rate in (0, 1):
             at = 2 * motion + rate
             now, then = loads.now[:, row, at], loads.then[:, row, at]
@@ -151,18 +152,74 @@ def closed(loads: BitLoads, s: ComplexArray, gx: ComplexArray, gt: ComplexArray)
 
 
 @dataclass(frozen=True, eq=False)
-class StringLoops:
-    """D = a + t b on many lines of one string at once.
+class Band:
+    """A string at all frequencies that matter.
 
     Attributes
     ----------
     string : StringAtBit
         The string.
+    omega : array, (G,)
+        rad/s, from 0 on.
+    gx, gt : array, (G,)
+        Its receptances there.
+    """
+
+    string: StringAtBit
+    omega: FloatArray
+    gx: ComplexArray
+    gt: ComplexArray
+
+    @functools.cached_property
+    def s(self) -> ComplexArray:
+        """iω, a little above 0 at 0."""
+        return _places(self.omega, 0.0)
+
+    def closed(self, loads: BitLoads) -> ComplexArray:
+        """Return D of N bits, (N, G)."""
+        return closed(loads, self.s, self.gx, self.gt)
+
+
+def band(string: StringAtBit, loads: tuple[BitLoads, ...]) -> Band:
+    """Return frequencies that resolve a string and all of these bits.
+
+    Raises
+    ------
+    InputError
+        If the material does not damp what cutting excites.
+    """
+    delay = max(float(some.delay.max()) for some in loads)
+    top = _highest(string, loads)
+    waves = max(delay / _PHASE, string.string.tension.transit_time)
+    omega = np.linspace(0.0, top, 2 + int(top * waves))
+    values = np.stack(string.receptances(_places(omega, 0.0)))
+    for _ in range(_GRID_ROUNDS):
+        ratio = values[:, 1:] / values[:, :-1]
+        change = np.maximum(np.abs(np.angle(ratio)), np.abs(np.log(np.abs(ratio))))
+        coarse = np.flatnonzero((change.max(axis=0) > _TURN) & (np.diff(omega) > 1e-9 * top))
+        if not coarse.size:
+            break
+        middle = 0.5 * (omega[coarse] + omega[coarse + 1])
+        values = np.insert(
+            values, coarse + 1, np.stack(string.receptances(_places(middle, 0.0))), axis=1
+        )
+        omega = np.insert(omega, coarse + 1, middle)
+    return Band(string, omega, *values)
+
+
+@dataclass(frozen=True, eq=False)
+class StringLoops:
+    """D = a + t b on many lines of one string at once.
+
+    Attributes
+    ----------
+    known : Band
+        The string.
     low, high : BitLoads
         The bits at t = 0 and at t = 1.
     """
 
-    string: StringAtBit
+    known: Band
     low: BitLoads
     high: BitLoads
 
@@ -173,18 +230,18 @@ class StringLoops:
 
     def take(self, index: IntArray) -> StringLoops:
         """Return the lines at the given places."""
-        return StringLoops(self.string, self.low.take(index), self.high.take(index))
+        return StringLoops(self.known, self.low.take(index), self.high.take(index))
 
     def _ends(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        gx, gt = self.string.receptances(s)
+        gx, gt = self.known.string.receptances(s)
         a = closed(self.low, s, gx, gt)
         return a, closed(self.high, s, gx, gt) - a
 
     def values(self, omega: FloatArray, line: float) -> tuple[ComplexArray, ComplexArray]:
-        """Return a and b at s = line + iω: ``omega`` (G,) for all lines, or one for each, (N,)."""
+        """Return a and b on the imaginary axis: of all lines on the band, or at one ω each."""
         if omega.ndim == 2:
-            # All rows are the one grid.
-            return self._ends(_places(omega[0], line))
+            a = self.known.closed(self.low)
+            return a, self.known.closed(self.high) - a
         a, b = self._ends(_places(omega, line)[:, None])
         return a[:, 0], b[:, 0]
 
@@ -203,36 +260,13 @@ def _places(omega: FloatArray, line: float) -> ComplexArray:
     return np.asarray(line + 1j * np.where(omega == 0.0, _SLOW, omega))
 
 
-def frequency_grid(string: StringAtBit, loads: tuple[BitLoads, ...]) -> FloatArray:
-    """Return frequencies that resolve the string and all of these bits, (G,), rad/s.
-
-    Raises
-    ------
-    InputError
-        If the material does not damp what cutting excites.
-    """
-    delay = max(float(some.delay.max()) for some in loads)
-    top = _highest(string, loads)
-    grid = np.linspace(0.0, top, 2 + int(top * max(delay / _PHASE, string.string.tension.transit_time)))
-    grid[0] = _SLOW
-    values = np.stack(string.receptances(1j * grid))
-    for _ in range(_GRID_ROUNDS):
-        ratio = values[:, 1:] / values[:, :-1]
-        change = np.maximum(np.abs(np.angle(ratio)), np.abs(np.log(np.abs(ratio))))
-        coarse = np.flatnonzero((change.max(axis=0) > _TURN) & (np.diff(grid) > 1e-9 * top))
-        if not coarse.size:
-            break
-        middle = 0.5 * (grid[coarse] + grid[coarse + 1])
-        values = np.insert(values, coarse + 1, np.stack(string.receptances(1j * middle)), axis=1)
-        grid = np.insert(grid, coarse + 1, middle)
-    grid[0] = 0.0
-    return grid
-
-
 def _highest(string: StringAtBit, loads: tuple[BitLoads, ...]) -> float:
     """Return the frequency above which no bit comes near to a root, rad/s."""
+    damping = string.string.damping
+    if not damping.retardation and not (damping.axial and damping.torsional):
+        raise InputError("damping of the string", "none", "above 0: else its roots lie on the axis")
     omega = np.geomspace(1.0, _HIGHEST, 4000)
-    gx, gt = (np.abs(g) for g in string.receptances(1j * omega))
+    gx, gt = (np.abs(g) for g in string.receptances(_places(omega, 0.0)))
     most = np.max([(np.abs(some.now) + np.abs(some.then)).max(axis=0) for some in loads], axis=0)
     answer = most[:, 0::2, None] + most[:, 1::2, None] * omega
     far = gx * answer[0, 0] + gt * answer[1, 1]
@@ -240,44 +274,41 @@ def _highest(string: StringAtBit, loads: tuple[BitLoads, ...]) -> float:
     near = np.flatnonzero(far > 0.5)
     if near.size and near[-1] > omega.size - 10:
         wanted = "above 0: without it cutting excites modes of any frequency"
-        raise InputError("kelvin_voigt damping", string.string.damping.retardation, wanted)
+        raise InputError("kelvin_voigt damping", damping.retardation, wanted)
     return float(1.1 * omega[near[-1]]) if near.size else 10.0
 
 
-def count_growing(
-    string: StringAtBit, loads: BitLoads, grid: FloatArray
-) -> IntArray:
+def count_growing(known: Band, loads: BitLoads) -> IntArray:
     """Return how many roots lie right of the imaginary axis at each point, (N,).
 
     By the turn of D along the axis, steps being halved where it turns fast.
 
     Parameters
     ----------
-    string : StringAtBit
+    known : Band
         The string.
     loads : BitLoads
         Of N points.
-    grid : array, (G,)
-        From `frequency_grid`.
 
     Raises
     ------
     UndecidedError
         If a root lies on the axis.
     """
-    s = 1j * np.where(grid == 0.0, _SLOW, grid)
-    gx, gt = string.receptances(s)
+    s = known.s
     counts = np.empty(len(loads.delay), dtype=np.int64)
-    for rows in np.array_split(np.arange(counts.size), max(1, counts.size * grid.size // _CHUNK)):
+    for rows in np.array_split(np.arange(counts.size), max(1, counts.size * s.size // _CHUNK)):
         some = loads.take(rows)
-        values = closed(some, s, gx, gt)
+        values = known.closed(some)
         steps = np.angle(values[:, 1:] / values[:, :-1])
-        line, at = np.nonzero(np.abs(steps) > _MOST_TURN)
-        turned = np.where(np.abs(steps) > _MOST_TURN, 0.0, steps).sum(axis=1)
-        turned += _halved(string, some, line, (s[at], s[at + 1]), (values[line, at], values[line, at + 1]))
+        fast = np.abs(steps) > _MOST_TURN
+        line, at = np.nonzero(fast)
+        turned = np.where(fast, 0.0, steps).sum(axis=1)
+        ends = (values[line, at], values[line, at + 1])
+        turned += _halved(known.string, some, line, (s[at], s[at + 1]), ends)
         # From the highest frequency on D only goes to 1.
         turned -= np.angle(values[:, -1])
-        counts[rows] = string.growing - np.rint(turned / math.pi)
+        counts[rows] = known.string.growing - np.rint(turned / math.pi)
     return counts
 
 
@@ -296,7 +327,8 @@ def _halved(
         if not line.size:
             return turned
         middle = 0.5 * (low + high)
-        between = closed(loads.take(line), middle[:, None], *(g[:, None] for g in string.receptances(middle)))[:, 0]
+        seen = (g[:, None] for g in string.receptances(middle))
+        between = closed(loads.take(line), middle[:, None], *seen)[:, 0]
         line = np.concatenate([line, line])
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
         first, last = np.concatenate([first, between]), np.concatenate([between, last])

@@ -16,11 +16,12 @@ from drillctrl.charts.affine_scan import affine_lines, find_crossings
 from drillctrl.charts.counting_scan import bisected_lines
 from drillctrl.charts.scan import IntArray, ScanLine
 from drillctrl.charts.string_loops import (
+    Band,
     BitLoads,
     StringLoops,
+    band,
     closed,
     count_growing,
-    frequency_grid,
 )
 from drillctrl.strings.at_bit import StringAtBit
 
@@ -61,14 +62,14 @@ def scan_string(
         Limits of the other one.
     """
     start, stop = (loads(positions, np.full(positions.size, end)) for end in (low, high))
-    loops = StringLoops(string, start, stop)
-    grid = frequency_grid(string, (start, stop))
+    known = band(string, (start, stop))
+    loops = StringLoops(known, start, stop)
 
     def count(shares: FloatArray) -> IntArray:
-        return count_growing(string, start.towards(stop, shares), grid)
+        return count_growing(known, start.towards(stop, shares))
 
     every = np.arange(positions.size)
-    found = find_crossings(loops, 0.0, grid, every, margin=_MARGIN)
+    found = find_crossings(loops, 0.0, known.omega, every, margin=_MARGIN)
     return affine_lines(positions, found, count, low, high)
 
 
@@ -77,15 +78,15 @@ def scan_string_counting(
 ) -> list[ScanLine]:
     """Scan many lines of one string along any parameter; see `scan_string`."""
     ends = tuple(loads(positions, np.full(positions.size, end)) for end in (low, high))
-    grid = frequency_grid(string, ends)
+    known = band(string, ends)
 
     def count(held: FloatArray, at: FloatArray) -> IntArray:
-        return count_growing(string, loads(held, at), grid)
+        return count_growing(known, loads(held, at))
 
     def settle(
         held: FloatArray, left: FloatArray, right: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        return _crossed(string, loads, grid, (held, left, right))
+        return _crossed(known, loads, (held, left, right))
 
     return bisected_lines(
         count, settle, positions, low, high, _SAMPLES, _HALVINGS, edges_alone=True
@@ -93,10 +94,7 @@ def scan_string_counting(
 
 
 def _crossed(
-    string: StringAtBit,
-    loads: Loads,
-    grid: FloatArray,
-    intervals: tuple[FloatArray, FloatArray, FloatArray],
+    known: Band, loads: Loads, intervals: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return where in intervals D vanishes on the axis, and ω there.
 
@@ -105,20 +103,19 @@ def _crossed(
     held, left, right = intervals
     middle = 0.5 * (left + right)
 
-    s = 1j * grid[1:]
-    size = np.abs(closed(loads(held, middle), s, *string.receptances(s)))
+    size = np.abs(known.closed(loads(held, middle)))
     # A root on the axis near by leaves a dip: the deepest few are tried.
     padded = np.pad(size, ((0, 0), (1, 1)), constant_values=np.inf)
     dips = np.where((size <= padded[:, :-2]) & (size <= padded[:, 2:]), size, np.inf)
     order = np.argsort(dips, axis=1)[:, :_TRIED]
     found = np.zeros(held.size, dtype=bool)
-    best, frequency = middle.copy(), grid[1:][order[:, 0]]
+    best, frequency = middle.copy(), known.omega[order[:, 0]]
     for choice in order.T:
         rest = np.flatnonzero(~found)
         if not rest.size:
             break
         some = tuple(part[rest] for part in intervals)
-        at, omega, good = _newton(string, loads, grid[1:][choice[rest]], some)
+        at, omega, good = _newton(known.string, loads, known.omega[choice[rest]], some)
         best[rest[good]], frequency[rest[good]] = at[good], omega[good]
         found[rest[good]] = True
     return best, frequency

@@ -144,6 +144,7 @@ def chart_command(
     check_figure(plot)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
     where = read_point(_with_axes(point, x, y))
+    result: StabilityChart | StabilisableChart | StabilityVolume
     if structure is not None and are_drives([structure]):
         result = _of_drive(where, x, y, structure, (k1, k2), level, optimise or bound, z_axis)
         deliver(result.to_dict(), result.summary, result.plot, as_json=as_json, out=out, plot=plot)
@@ -151,7 +152,6 @@ def chart_command(
     scales = scales_at(where, structure)
     x, y = _gain_axis("--x", x, structure, scales), _gain_axis("--y", y, structure, scales)
     gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
-    result: StabilityChart | StabilisableChart | StabilityVolume
     if z_axis is not None:
         if optimise or level or bound:
             raise InputError("--z", z_axis, "left out with --optimise, --bound or --level")

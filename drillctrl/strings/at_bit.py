@@ -95,5 +95,10 @@ def string_at_bit(plant: Plant) -> StringAtBit | None:
     if drives and not laws:
         wanted = "under a law that holds its speed, such as --structure soft-torque"
         raise InputError("top drive", "free to turn", wanted)
-    control = laws[0].control if laws else None
-    return StringAtBit(plant.string.string, control)
+    return _at_bit(plant.string.string, laws[0].control if laws else None)
+
+
+@functools.lru_cache(maxsize=64)
+def _at_bit(string: DrillString, control: DriveControl | None) -> StringAtBit:
+    """Return the same object for equal strings, which keeps what it has counted."""
+    return StringAtBit(string, control)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.drilling.bit_rock import BitRock
@@ -61,7 +62,8 @@ def changed_rig(rig: Rig, depth: float | None = None, mud: float | None = None) 
     if mud is not None:
         checked_number("mud", mud, *permitted_range(string, "mud"))
         string = replace(string, mud_density=mud)
-    return replace(rig, string=string, **lumped_values(string))
+    values: dict[str, Any] = {**lumped_values(string)}
+    return replace(rig, string=string, **values)
 
 
 def changed_case(case: Case, point: RigPoint) -> Case:
