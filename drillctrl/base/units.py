@@ -107,7 +107,8 @@ _TURNS_A_MINUTE = ("1/min", "/min", "min^-1", "min⁻¹", "r/min")
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
 _FRACTION = r"(?:(?P<whole>\d{1,4})[ -])?(?P<over>\d{1,3})/(?P<under>\d{1,3})(?=[ \"'a-z])"
-_UNIT = r"(?:[A-Za-zµμ°²³()·*/ _.\-]|(?:\^|\*\*)-?[1-4](?![\d*^]))*|[\"']|1/(?:min|s)|min⁻¹"
+_POWER = r"(?<=[A-Za-z])[2-4](?![\w^*.])|(?:\^|\*\*)-?[1-4](?![\d*^])"
+_UNIT = rf"(?:[A-Za-zµμ°²³()·*/ _.\-]|{_POWER})*|[\"']|1/(?:min|s)|min⁻¹"
 
 
 @functools.cache
@@ -185,6 +186,8 @@ def _readings(written: str, dimension: Dimension) -> tuple[str, ...]:
         return ("rpm",)
     # kN.m, ft-lb, kN·m.
     unit = re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", "*", unit).replace("·", "*")
+    # kg/m3, N/mm2.
+    unit = re.sub(r"(?<=[A-Za-z])([2-4])\b", r"^\1", unit)
     unit = re.sub(r"\b(k?)(ft|in)(k?lbf)\b", r"\1\2*\3", unit)
     if dimension in (MASS, DENSITY, LINEAR_DENSITY, INERTIA):
         return (unit,)

@@ -9,14 +9,16 @@ can lie.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import elementwise
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.charts.counting_scan import LoopMatrices, Matrices, count_right
-from drillctrl.charts.scan import ScanLine
+from drillctrl.charts.scan import IntArray, ScanLine
 from drillctrl.delay.reduced import ReducedLoops, reduced_matrices
 from drillctrl.spectrum.characteristic import perron_bounds
 
@@ -26,7 +28,28 @@ _CHUNK = 400_000
 _GRID_TURN = 1.0
 _GRID_LINES = 3
 _GRID_ROUNDS = 12
+# |a + t b| over |a| where s is taken for a root.
+_AT_ROOT = 0.1
 _SHARP = {"xatol": 1e-12, "xrtol": 1e-12}
+
+
+class LinesOfLoops(Protocol):
+    """Lines along which a characteristic function is a + t b, with t from 0 to 1."""
+
+    @property
+    def count(self) -> int:
+        """Number of lines."""
+
+    def take(self, index: IntArray) -> LinesOfLoops:
+        """Return the lines at the given places."""
+
+    def values(self, omega: FloatArray, line: float) -> tuple[ComplexArray, ComplexArray]:
+        """Return a and b at s = line + iω, of the shape of ``omega``, (N,) or (N, G)."""
+
+    def values_and_slopes(
+        self, omega: FloatArray, line: float
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return a, da/ds, b and db/ds likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +67,11 @@ class AffineLoops:
     low: ReducedLoops
     high: ReducedLoops
     reach: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number of lines."""
+        return int(self.reach.size)
 
     @property
     def delays(self) -> FloatArray:
@@ -154,10 +182,65 @@ def scan_affine(
     for key in np.unique(group):
         members = np.flatnonzero(group == key)
         grid = frequency_grid(loops.take(members), line)
-        for part in np.array_split(members, max(1, members.size * grid.size // _CHUNK)):
-            rows, *rest = _scan_group(loops.take(part), line, grid)
-            new = (part[rows], *rest)
-            found = [np.concatenate(pair) for pair in zip(found, new, strict=True)]
+        new = find_crossings(loops, line, grid, members)
+        found = [np.concatenate(pair) for pair in zip(found, new, strict=True)]
+
+    def count(shares: FloatArray) -> IntArray:
+        return count_right(matrices(positions, low + shares * (high - low)), line)
+
+    return affine_lines(positions, found, count, low, high)
+
+
+def find_crossings(
+    loops: LinesOfLoops,
+    line: float,
+    grid: FloatArray,
+    members: IntArray,
+    margin: float = np.inf,
+) -> list[FloatArray]:
+    """Return line, ω, t and change of the count of every crossing of some lines.
+
+    Parameters
+    ----------
+    loops : LinesOfLoops
+        All lines.
+    line : float
+        σ.
+    grid : array, (G,)
+        Frequencies that resolve a and b of these lines.
+    members : array of int, (k,)
+        The lines.
+    margin : float
+        Crossings with t beyond [−margin, 1 + margin] need not be found.
+    """
+    found = [np.zeros(0)] * 4
+    for part in np.array_split(members, max(1, members.size * grid.size // _CHUNK)):
+        rows, *rest = _scan_group(loops.take(part), line, grid, margin)
+        new = (part[rows], *rest)
+        found = [np.concatenate(pair) for pair in zip(found, new, strict=True)]
+    return found
+
+
+def affine_lines(
+    positions: FloatArray,
+    found: list[FloatArray],
+    count: Callable[[FloatArray], IntArray],
+    low: float,
+    high: float,
+) -> list[ScanLine]:
+    """Return scan lines from what `find_crossings` says of all of them.
+
+    Parameters
+    ----------
+    positions : array, (N,)
+        The parameter that is held.
+    found : list of array
+        Line, ω, t and change of the count.
+    count : callable
+        t of one place on each line, (N,) → number of roots right of σ there.
+    low, high : float
+        Limits of the affine parameter.
+    """
     rows, frequency, t, jump = found
     inside = (t > 0.0) & (t < 1.0) & (jump != 0)
     rows, frequency, t, jump = rows[inside], frequency[inside], t[inside], jump[inside]
@@ -173,7 +256,7 @@ def scan_affine(
         edges = np.concatenate([[0.0], t[segment], [1.0]])
         places[i] = int(np.argmax(np.diff(edges)))
         probes[i] = 0.5 * (edges[places[i]] + edges[places[i] + 1])
-    known = count_right(matrices(positions, low + probes * (high - low)), line)
+    known = count(probes)
     lines = []
     for i, segment in enumerate(segments):
         steps = np.concatenate([[0], np.cumsum(jump[segment])])
@@ -194,12 +277,12 @@ def scan_affine(
 
 
 def _scan_group(
-    loops: AffineLoops, line: float, grid: FloatArray
+    loops: LinesOfLoops, line: float, grid: FloatArray, margin: float
 ) -> tuple[np.ndarray, FloatArray, FloatArray, np.ndarray]:
     """Return (line, ω, t, change of the count) of every crossing."""
-    count = loops.reach.size
+    count = loops.count
     a, b = loops.values(np.broadcast_to(grid, (count, grid.size)), line)
-    rows, frequency = _zeros(loops, a * b.conj(), grid, line)
+    rows, frequency = _zeros(loops, (a, b), grid, line, margin)
     at, jump = _crossings(loops, rows, frequency, line)
     # A real root at s = σ: one root changes sides, not a pair.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -215,17 +298,25 @@ def _scan_group(
 
 
 def _zeros(
-    loops: AffineLoops,
-    product: ComplexArray,
+    loops: LinesOfLoops,
+    values: tuple[ComplexArray, ComplexArray],
     grid: FloatArray,
     line: float,
+    margin: float,
 ) -> tuple[np.ndarray, FloatArray]:
     """Find the sign changes of Im(a b*) in ω > 0; return (row, ω)."""
+    product = values[0] * values[1].conj()
     g = product.imag
     change = np.signbit(g[:, 1:]) != np.signbit(g[:, :-1])
     change[:, 0] = False
     # At ω = 0 the function vanishes by symmetry: compare its slope there.
     change[:, 0] = np.signbit(g[:, 1]) != np.signbit(_near_zero(loops, grid, line))
+    if np.isfinite(margin):
+        # Both ends on the same side, far off: what lies between is not on the line either.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = -product.real / np.abs(values[1]) ** 2
+        low, high = np.fmin(t[:, 1:], t[:, :-1]), np.fmax(t[:, 1:], t[:, :-1])
+        change &= (high > -margin) & (low < 1.0 + margin)
     rows, columns = np.nonzero(change)
     left, right = grid[columns].copy(), grid[columns + 1].copy()
     left[columns == 0] = 1e-3 * grid[1]
@@ -244,14 +335,14 @@ def _zeros(
     return rows, found.x
 
 
-def _near_zero(loops: AffineLoops, grid: FloatArray, line: float) -> FloatArray:
-    omega = np.full(loops.reach.size, 1e-3 * grid[1])
+def _near_zero(loops: LinesOfLoops, grid: FloatArray, line: float) -> FloatArray:
+    omega = np.full(loops.count, 1e-3 * grid[1])
     a, b = loops.values(omega, line)
     return np.asarray((a * b.conj()).imag)
 
 
 def _dips(
-    loops: AffineLoops, g: FloatArray, grid: FloatArray, line: float
+    loops: LinesOfLoops, g: FloatArray, grid: FloatArray, line: float
 ) -> tuple[np.ndarray, FloatArray, FloatArray]:
     """Split intervals in which a parabola through three samples crosses zero twice."""
     empty = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
@@ -290,7 +381,7 @@ def _dips(
 
 
 def _crossings(
-    loops: AffineLoops,
+    loops: LinesOfLoops,
     rows: np.ndarray,
     omega: FloatArray,
     line: float,
@@ -298,8 +389,10 @@ def _crossings(
 ) -> tuple[FloatArray, np.ndarray]:
     """Return t and the change of the count (±2 for a pair) at each crossing."""
     a, slope_a, b, slope_b = loops.take(rows).values_and_slopes(omega, line)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = -(a * b.conj()).real / np.abs(b) ** 2 if at is None else at
+        # Where b vanishes to rounding, as at 1 = E, no t makes a root.
+        t = np.where(np.abs(a + t * b) < _AT_ROOT * np.abs(a), t, np.inf)
         motion = (-b / (slope_a + t * slope_b)).real
     jump = np.where(np.isfinite(motion), 2 * np.sign(motion), 0).astype(np.int64)
     return np.asarray(np.nan_to_num(t, nan=np.inf)), jump

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,6 +12,8 @@ from drillctrl.base.units import Dimension
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.steady import steady_state
+from drillctrl.strings.changed import permitted_range, string_of
+from drillctrl.strings.rig import StringRig
 
 # Permitted range and symbol of each dimensionless group.
 GROUPS = {
@@ -27,6 +30,11 @@ RIG_AXES: dict[str, tuple[str, Dimension, str]] = {
     "rop": ("m/h", units.SPEED, "rate of penetration"),
     "wob": ("kN", units.FORCE, "weight on bit"),
     "rock_strength": ("MPa", units.STRESS, "rock strength ε"),
+}
+# Of rigs whose string is known.
+STRING_AXES: dict[str, tuple[str, Dimension, str]] = {
+    "depth": ("m", units.LENGTH, "depth"),
+    "mud": ("kg/m^3", units.DENSITY, "mud weight"),
 }
 
 
@@ -85,6 +93,10 @@ def make_axis(
         raise InputError("axis", repr(given), "a name and two limits") from None
     gains = structure.gain_names if structure is not None else ()
     rigs = tuple(RIG_AXES) if case.rig_point is not None else ()
+    if isinstance(case.rig, StringRig):
+        rigs += tuple(STRING_AXES)
+    elif name in STRING_AXES:
+        string_of(case.rig)
     own = tuple(case.plant.own) if case.plant is not None else ()
     groups = tuple(GROUPS) if case.drills else ()
     known = (*groups, *own, *rigs, *gains)
@@ -97,17 +109,20 @@ def make_axis(
         floor, ceiling, label = GROUPS[name]
     elif name in own:
         label = name.replace("_", " ")
-    elif name in RIG_AXES:
+    elif name in rigs:
         floor, ceiling = 0.0, 1e6
-        unit, dimension, word = RIG_AXES[name]
+        unit, dimension, word = {**RIG_AXES, **STRING_AXES}[name]
         label = f"{word}, {unit}"
         low, high = (_in_unit(name, v, unit, dimension) for v in (low, high))
+        if name in STRING_AXES:
+            floor, ceiling = permitted_range(string_of(case.rig), name)
         if name == "wob" and case.rig_point is not None:
             # The wear flat carries this much before anything is cut.
             idle = steady_state(replace(case.rig_point, penetration_rate=0.0)).weight_on_bit
             floor = units.from_si(idle, dimension, unit)
-    low = checked_number(f"{name} (lower limit)", low, floor, ceiling)
-    high = checked_number(f"{name} (upper limit)", high, floor, ceiling)
+    of = f", {unit}" if name in STRING_AXES else ""
+    low = checked_number(f"{name} (lower limit{of})", low, floor, ceiling)
+    high = checked_number(f"{name} (upper limit{of})", high, floor, ceiling)
     if not low < high:
         raise InputError(f"limits of {name}", f"{low:g}:{high:g}", "lower:upper with lower < upper")
     return Axis(name, low, high, unit, label)
@@ -125,7 +140,8 @@ def gain_label(name: str) -> str:
     return name[:1] + name[1:].translate(digits)
 
 
+@functools.cache
 def to_si_factor(name: str) -> float:
     """Return the SI value of one unit of a rig axis."""
-    unit, dimension, _ = RIG_AXES[name]
+    unit, dimension, _ = {**RIG_AXES, **STRING_AXES}[name]
     return units.to_si(name, f"1 {unit}", dimension)

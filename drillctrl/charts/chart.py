@@ -16,13 +16,14 @@ from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
-from drillctrl.charts.sweep import sweep
+from drillctrl.charts.sweep import FIRST_LINES, sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
-from drillctrl.spectrum.count import count_right_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_STRINGS = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,8 @@ class StabilityChart:
         σ: a place counts as stable where no root lies right of Re s = σ.
     method : str
         ``"delay"``: crossings in closed form along ω0; ``"affine"``: along a parameter in
-        which the characteristic equation is affine; ``"counting"``: roots counted at sample
+        which the characteristic equation is affine; ``"receptance"``: the same from the exact
+        receptances of a string of pipe; ``"counting"``: roots counted at sample
         places, crossings by bisection.
     curves : tuple of Curve
         The boundary of the stable set, with the frequency of the crossing root.
@@ -72,7 +74,7 @@ class StabilityChart:
 
         None where a root lies too near the line to tell.
         """
-        return count_right_of(self.plane.system(x, y), self.level).count
+        return self.plane.unstable_roots(x, y, self.level)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -94,7 +96,7 @@ class StabilityChart:
     def summary(self) -> str:
         """Return a text for people."""
         plane = self.plane
-        name = plane.structure.name if plane.structure else "open loop"
+        name = plane.name or "open loop"
         lines = [
             f"Stability chart of {name}",
             f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
@@ -192,7 +194,9 @@ def chart(
     method, rows, scanner = choose_scanner(plane, level)
     held, scanned = (plane.y, plane.x) if rows else (plane.x, plane.y)
     start = first_position(held)
-    result = sweep(scanner, start, held.high, tolerance=tolerance)
+    # Every line at a depth has a string of its own, which costs.
+    first = _STRINGS if held.name == "depth" else FIRST_LINES
+    result = sweep(scanner, start, held.high, tolerance=tolerance, first=first)
     curves = stable_curves(result.lines, rows=rows)
     regions = label_regions(plane, result.lines, level, rows=rows)
     # Nothing is known of the strip that holds no line.

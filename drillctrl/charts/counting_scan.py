@@ -76,18 +76,59 @@ def scan_counting(
     line : float
         σ: roots right of it are counted.
     """
-    samples = np.linspace(low, high, _SAMPLES)
-    held = np.repeat(positions, _SAMPLES)
-    counts = count_right(matrices(held, np.tile(samples, positions.size)), line)
-    counts = counts.reshape(positions.size, _SAMPLES)
+
+    def settle(
+        held: FloatArray, left: FloatArray, right: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        at = 0.5 * (left + right)
+        return at, _frequencies(matrices(held, at), line)
+
+    def count(held: FloatArray, at: FloatArray) -> IntArray:
+        return count_right(matrices(held, at), line)
+
+    return bisected_lines(count, settle, positions, low, high, _SAMPLES, _HALVINGS)
+
+
+def bisected_lines(
+    count: Callable[[FloatArray, FloatArray], IntArray],
+    settle: Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+    positions: FloatArray,
+    low: float,
+    high: float,
+    every: int,
+    halvings: int,
+    *,
+    edges_alone: bool = False,
+) -> list[ScanLine]:
+    """Return scan lines from counts alone.
+
+    Parameters
+    ----------
+    count : callable
+        Number of roots right of the line at (positions, places along the lines).
+    settle : callable
+        Crossings and |Im s| there at (positions, lower and upper ends of short intervals).
+    positions : array, (N,)
+        The parameter that is held.
+    low, high : float
+        Limits of the other one.
+    every, halvings : int
+        Samples of each line, and how often intervals are halved.
+    edges_alone : bool
+        Settle those crossings alone that bound a stable stretch; the others stay where the
+        counts put them, without a frequency.
+    """
+    samples = np.linspace(low, high, every)
+    held = np.repeat(positions, every)
+    counts = count(held, np.tile(samples, positions.size)).reshape(positions.size, every)
     rows, columns = np.nonzero(counts[:, 1:] != counts[:, :-1])
     left, right = samples[columns], samples[columns + 1]
     before, after = counts[rows, columns], counts[rows, columns + 1]
-    for _ in range(_HALVINGS):
+    for _ in range(halvings):
         if not rows.size:
             break
         middle = 0.5 * (left + right)
-        between = count_right(matrices(positions[rows], middle), line)
+        between = count(positions[rows], middle)
         first, second = between != before, between != after
         rows = np.concatenate([rows[first], rows[second]])
         left, right = (
@@ -98,8 +139,11 @@ def scan_counting(
             np.concatenate([before[first], between[second]]),
             np.concatenate([between[first], after[second]]),
         )
-    at = 0.5 * (left + right)
-    omega = _frequencies(matrices(positions[rows], at), line) if rows.size else at
+    at, omega = 0.5 * (left + right), np.zeros(rows.size)
+    # Only the edge of what is stable has to be sharp.
+    edge = np.flatnonzero((before == 0) | (after == 0)) if edges_alone else np.arange(rows.size)
+    if edge.size:
+        at[edge], omega[edge] = settle(positions[rows[edge]], left[edge], right[edge])
     order = np.lexsort((at, rows))
     rows, at, omega, jump = rows[order], at[order], omega[order], (after - before)[order]
     bounds = np.searchsorted(rows, np.arange(positions.size + 1))

@@ -79,7 +79,7 @@ def axis_text(axis: Axis) -> str:
 def plane_title(plane: Plane) -> str:
     """Say what is held in the chart."""
     point = plane.point
-    head = "open loop" if plane.structure is None else plane.structure.name
+    head = plane.name or "open loop"
     if point is None:
         return head
     held = {

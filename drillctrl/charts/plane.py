@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,34 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.charts.axes import RIG_AXES, Axis, make_axis, to_si_factor
+from drillctrl.charts.axes import GROUPS, RIG_AXES, STRING_AXES, Axis, make_axis, to_si_factor
+from drillctrl.charts.string_loops import EFFORTS, MOTIONS, BitLoads, exact_count, si_loads
 from drillctrl.delay.closing import close_loop, gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.loops import gains_along, loop_arrays
 from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.drilling.coefficients import GROUP_NAMES
 from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.steady import rig_point_at_weight_on_bit, steady_state
 from drillctrl.drilling.structures import as_structure
+from drillctrl.spectrum.count import count_right_of
+from drillctrl.strings.at_bit import StringAtBit, string_at_bit
+from drillctrl.strings.changed import changed_case, changed_rig, string_of
+from drillctrl.strings.rig import StringRig
 
 AxisLike = Axis | Sequence[object]
+
+
+@functools.lru_cache(maxsize=256)
+def _changed(rig: Rig, depth: float | None, mud: float | None) -> StringRig:
+    return changed_rig(rig, depth, mud)
+
+
+@functools.lru_cache(maxsize=256)
+def _hung(known: StringAtBit, rig: Rig, depth: float) -> StringAtBit:
+    return replace(known, string=string_of(_changed(rig, depth, None)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +71,15 @@ class Plane:
     def point(self) -> OperatingPoint | None:
         """The operating point, if the physics is known."""
         return self.case.point
+
+    @property
+    def name(self) -> str | None:
+        """What is fed back: the structure, or the law of the top drive; None for neither."""
+        if self.structure is not None:
+            return self.structure.name
+        plant = self.case.plant
+        known = None if plant is None else string_at_bit(plant)
+        return None if known is None or known.control is None else known.control.name
 
     @property
     def rig_point(self) -> RigPoint | None:
@@ -85,31 +112,50 @@ class Plane:
 
     def _parameters(self, values: dict[str, FloatArray], count: int) -> dict[str, FloatArray]:
         """Return the parameters that vary, by name; those of a rig as the groups they move."""
-        given = {name: v for name, v in values.items() if name in RIG_AXES}
-        own = {n: v for n, v in values.items() if n not in RIG_AXES and not self._is_gain(n)}
+        given, own = self._split(values)
         if not given:
             return own
-        points = [self._at_rig({k: float(v[i]) for k, v in given.items()}) for i in range(count)]
+        # A string of pipe has no use for some groups.
+        names = self.case.physics("an axis of a rig")[0].group_names
+        points = [point.operating_point() for point in self._rig_points(given, count)]
         groups = {
-            field.name: np.array([getattr(point, field.name) for point in points], dtype=float)
-            for field in dataclasses.fields(OperatingPoint)
+            name: np.array([getattr(point, name) for point in points], dtype=float)
+            for name in names
         }
         return {**groups, **own}
+
+    def _split(
+        self, values: dict[str, FloatArray]
+    ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+        """Return what varies of the rig, and what else does but gains."""
+        of_rig = {*RIG_AXES, *STRING_AXES} if self.rig_point is not None else set()
+        given = {name: v for name, v in values.items() if name in of_rig}
+        return given, {n: v for n, v in values.items() if n not in given and not self._is_gain(n)}
+
+    def _rig_points(self, given: dict[str, FloatArray], count: int) -> list[RigPoint]:
+        return [self._at_rig({k: float(v[i]) for k, v in given.items()}) for i in range(count)]
 
     def _is_gain(self, name: str) -> bool:
         return self.structure is not None and name in self.structure.gain_names
 
-    def _at_rig(self, values: dict[str, float]) -> OperatingPoint:
+    def _at_rig(self, values: dict[str, float]) -> RigPoint:
         point = self.rig_point
         assert point is not None
         si = {name: value * to_si_factor(name) for name, value in values.items()}
         rig = point.rig
+        if self.varied_string:
+            rig = _changed(rig, si.get("depth"), si.get("mud"))
         if "rock_strength" in si:
             rig = rig.with_rock_strength(si["rock_strength"])
         speed = si.get("speed", point.rotary_speed)
         if "wob" in si:
-            return rig_point_at_weight_on_bit(rig, speed, si["wob"]).operating_point()
-        return RigPoint(rig, speed, si.get("rop", point.penetration_rate)).operating_point()
+            return rig_point_at_weight_on_bit(rig, speed, si["wob"])
+        return RigPoint(rig, speed, si.get("rop", point.penetration_rate))
+
+    @property
+    def varied_string(self) -> bool:
+        """Whether an axis changes the string itself."""
+        return self.rig_point is not None and not {self.x.name, self.y.name}.isdisjoint(STRING_AXES)
 
     def _gains(self, values: dict[str, FloatArray], count: int) -> tuple[FloatArray, FloatArray]:
         """Return K1 and K2 of every place, each (N, m, p)."""
@@ -125,9 +171,84 @@ class Plane:
             self.case, self._parameters(values, x.size), x.size, self.structure, *gains
         )
 
+    def string_loads(
+        self, x: FloatArray, y: FloatArray
+    ) -> tuple[list[StringAtBit], BitLoads] | None:
+        """Return the string at each of N places, and what the bits answer there.
+
+        None where there is more than a bit on a string of pipe, or more is fed back than the
+        bit's own motion.
+        """
+        plant, _ = self.case.physics("a chart of a string")
+        known = string_at_bit(plant)
+        if known is None:
+            return None
+        values = {self.x.name: x, self.y.name: y}
+        given, own = self._split(values)
+        if not set(own) <= {*GROUPS, *plant.bit.values}:
+            return None
+        gains = None if self.structure is None else self._bit_gains(self.structure, values, x.size)
+        if self.structure is not None and gains is None:
+            return None
+        strings = [known] * x.size
+        rows = self._bit_rows(given, own, x.size)
+        if "depth" in given:
+            # Mud bears on weights, not on how a string swings.
+            depths, where = np.unique(given["depth"], return_inverse=True)
+            assert self.case.rig is not None
+            hung = [_hung(known, self.case.rig, depth) for depth in depths.tolist()]
+            strings = [hung[i] for i in where.tolist()]
+        return strings, si_loads(plant.bit, rows, strings, gains, known)
+
+    def unstable_roots(self, x: float, y: float, level: float = 0.0) -> int | None:
+        """Count the roots right of Re s = level at one place, by the argument principle.
+
+        Those of a string of pipe are counted on the exact string, where that can be. None
+        where a root lies too near the line to tell.
+        """
+        found = None
+        if level == 0.0 and self.case.drills:
+            found = self.string_loads(np.array([x]), np.array([y]))
+        if found is None:
+            return count_right_of(self.system(x, y), level).count
+        try:
+            return exact_count(found[0][0], found[1])
+        except InputError:
+            return None
+
+    def _bit_rows(
+        self, given: dict[str, FloatArray], own: dict[str, FloatArray], count: int
+    ) -> FloatArray:
+        """Return groups and parameters of the bit's law at each place, (N, k)."""
+        plant, point = self.case.physics("a chart of a string")
+        points = [point.with_changes(
+            **{name: float(v[i]) for name, v in own.items() if name in GROUP_NAMES}
+        ) for i in range(count)]  # fmt: skip
+        if given:
+            points = [found.operating_point() for found in self._rig_points(given, count)]
+        rows = np.array([[getattr(p, name) for name in GROUP_NAMES] for p in points], dtype=float)
+        law: dict[str, Any] = {**plant.bit.values, **own}
+        more = [np.broadcast_to(law[name], count) for name in plant.bit.values]
+        return np.column_stack([rows, *more])
+
+    def _bit_gains(
+        self, structure: FeedbackStructure, values: dict[str, FloatArray], count: int
+    ) -> FloatArray | None:
+        """Return what is fed back on the bit's states, now and τ0 ago, (2, N, 2, 4)."""
+        if not (set(structure.inputs) <= set(EFFORTS) and set(structure.outputs) <= set(MOTIONS)):
+            return None
+        rows = [EFFORTS.index(name) for name in structure.inputs]
+        columns = [MOTIONS.index(name) for name in structure.outputs]
+        whole = np.zeros((2, count, 2, 4))
+        for part, gains in zip(whole, self._gains(values, count), strict=True):
+            part[:, np.array(rows)[:, None], columns] = gains
+        return whole
+
     def case_at(self, x: float, y: float) -> Case:
         """Return the case at one place."""
         values = {self.x.name: np.array([x]), self.y.name: np.array([y])}
+        if self.varied_string:
+            return changed_case(self.case, self._rig_points(self._split(values)[0], 1)[0])
         changes = {name: float(v[0]) for name, v in self._parameters(values, 1).items()}
         if "damping" in changes:
             changes["xi"] = changes["kappa"] = changes.pop("damping")
@@ -155,7 +276,8 @@ def check_plane(plane: Plane) -> None:
     sets["rock_strength"], sets["wob"] = ("psi", "delta0"), ("delta0",)
     first = set(sets.get(plane.x.name, (plane.x.name,)))
     second = set(sets.get(plane.y.name, (plane.y.name,)))
-    both_rig = plane.x.name in RIG_AXES and plane.y.name in RIG_AXES
+    of_rig = {*RIG_AXES, *STRING_AXES}
+    both_rig = plane.x.name in of_rig and plane.y.name in of_rig
     weight_twice = {plane.x.name, plane.y.name} == {"rop", "wob"}
     if plane.x.name == plane.y.name or weight_twice or (first & second and not both_rig):
         raise InputError("y", plane.y.name, f"another parameter than x = {plane.x.name}")
@@ -198,7 +320,6 @@ def make_plane(
 
 def plane_fields(plane: Plane) -> dict[str, Any]:
     """Return what a chart was drawn over."""
-    structure = plane.structure
     axes = {
         key: {"name": axis.name, "low": axis.low, "high": axis.high, "unit": axis.unit or None}
         for key, axis in (("x", plane.x), ("y", plane.y))
@@ -206,7 +327,7 @@ def plane_fields(plane: Plane) -> dict[str, Any]:
     return {
         "operating_point": plane.point and dataclasses.asdict(plane.point),
         "axes": axes,
-        "structure": structure.name if structure else None,
+        "structure": plane.name,
         "K1": plane.K1.ravel().tolist(),
         "K2": plane.K2.ravel().tolist(),
     }

@@ -8,7 +8,6 @@ import numpy as np
 
 from drillctrl.charts.plane import Plane
 from drillctrl.charts.scan import ScanLine
-from drillctrl.spectrum.count import count_right_of
 
 _LABELLING_LINES = 65
 _SMALLEST_SHARE = 1e-3
@@ -112,6 +111,6 @@ def label_regions(
         x, y = (at, position) if rows else (position, at)
         confirmed = None
         if rank < _MOST_CHECKED:
-            confirmed = count_right_of(plane.system(x, y), level).count == count
+            confirmed = plane.unstable_roots(x, y, level) == count
         regions.append(Region(count, float(x), float(y), float(area), confirmed))
     return tuple(regions)

@@ -14,7 +14,7 @@ import numpy as np
 
 from drillctrl.charts.scan import ScanLine, Scanner
 
-_FIRST_LINES = 97
+FIRST_LINES = 97
 _NARROWEST = 2e-5
 _ROUNDS = 18
 _INSET = 1e-6
@@ -71,7 +71,7 @@ def sweep(
     high: float,
     *,
     tolerance: float = 2e-4,
-    first: int = _FIRST_LINES,
+    first: int = FIRST_LINES,
     narrowest: float = _NARROWEST,
     inset: float = _INSET,
 ) -> Sweep:

@@ -10,6 +10,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.axes import read_axis, with_axes
+from drillctrl.cli.drives import are_drives, driven_case
 from drillctrl.cli.gains import Scales, read_bounds, read_gains, scales_at
 from drillctrl.cli.output import (
     check_figure,
@@ -34,7 +35,11 @@ MESH_ENDINGS = (".vtk", ".ply", ".stl")
 @point_options
 @click.option("--x", "x_axis", default="omega0=0.5:25", show_default=True, metavar="NAME=LOW:HIGH")
 @click.option("--y", "y_axis", default="delta0=0:15", show_default=True, metavar="NAME=LOW:HIGH")
-@click.option("--structure", help="p, case1, pd or case2; without it, the open loop.")
+@click.option(
+    "--structure",
+    help="p, case1, pd or case2, or of a top drive: stiff, soft-torque, z-torque, dynamic-2 …; "
+    "without it, the open loop.",
+)
 @click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
 @click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
 @click.option(
@@ -80,7 +85,8 @@ def chart_command(
 
     \b
     Axes: omega0, delta0, psi, eta, xi, kappa, damping; gains such as K1_1;
-    with --rig also speed (rpm), rop (m/h), wob (kN), rock_strength (MPa).
+    with --rig also speed (rpm), rop (m/h), wob (kN), rock_strength (MPa), and of
+    a string depth (m; pipe added at the top) and mud (kg/m^3).
 
     \b
     Examples:
@@ -88,6 +94,8 @@ def chart_command(
       drillctrl chart --x K1_1=-10:10 --y K2_1=-10:10 --structure case1
       drillctrl chart --rig table1 --speed "120 rpm" --rop "20 m/h" \\
           --x "speed=30:300 rpm" --y "rop=0:60 m/h" --structure p --K1 "-2 kN*m/rad"
+      drillctrl chart --rig vertical-3000 --structure soft-torque --rop "10 m/h" \\
+          --x "depth=1000:4000 m" --y "speed=60:180 rpm"
       drillctrl chart --z psi=0.1:26 --y delta0=0:5 --out volume.vtk
       drillctrl chart --optimise --structure p --x omega0=0:25 --y delta0=0:18
     """
@@ -97,10 +105,14 @@ def chart_command(
     check_figure(plot)
     x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
     where = read_point(with_axes(point, x, y))
+    result: StabilityChart | StabilisableChart | StabilityVolume
+    if structure is not None and are_drives([structure]):
+        result = _of_drive(where, x, y, structure, (k1, k2), level, optimise or bound, z_axis)
+        deliver(result.to_dict(), result.summary, result.plot, as_json=as_json, out=out, plot=plot)
+        return
     scales = scales_at(where, structure)
     x, y = _gain_axis("--x", x, structure, scales), _gain_axis("--y", y, structure, scales)
     gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
-    result: StabilityChart | StabilisableChart | StabilityVolume
     if z_axis is not None:
         if optimise or level or bound:
             raise InputError("--z", z_axis, "left out with --optimise, --bound or --level")
@@ -117,6 +129,27 @@ def chart_command(
 
         result = chart(where, x, y, structure, *gains, level=level)
     deliver(result.to_dict(), result.summary, result.plot, as_json=as_json, out=out, plot=plot)
+
+
+def _of_drive(
+    where: OperatingPoint | RigPoint,
+    x: tuple[str, object, object],
+    y: tuple[str, object, object],
+    structure: str,
+    gains: tuple[str | None, str | None],
+    level: float,
+    optimised: object,
+    z_axis: str | None,
+) -> StabilityChart:
+    """Return the chart of a string that is turned by a drive under a law."""
+    from drillctrl.charts.chart import chart
+    from drillctrl.drilling.bit_rock import PaperLaw
+
+    if optimised:
+        raise InputError("--structure", structure, "one that acts at the bit with --optimise")
+    if z_axis is not None:
+        raise InputError("--z", z_axis, "left out where a drive turns a string")
+    return chart(driven_case(where, structure, gains, False, PaperLaw()), x, y, level=level)
 
 
 def _gain_axis(

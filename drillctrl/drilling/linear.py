@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.drilling.bit_rock import (
+    BitRock,
     Contact,
     kinematics,
     steady_delay,
@@ -16,7 +17,7 @@ from drillctrl.drilling.bit_rock import (
     steady_load,
     switched,
 )
-from drillctrl.drilling.plant import Plant, by_form, expressions
+from drillctrl.drilling.plant import Plant, by_form, expressions, paper_plant
 
 BIT_STATES = 4
 
@@ -79,6 +80,31 @@ def bit_response(plant: Plant) -> ca.Function:
     form, bit = expressions(plant), _steady_bit(plant)
     outputs = [bit.load_now, bit.load_depth, bit.depth_then, steady_delay(form.c)]
     return ca.Function("bit_response", [form.parameters], outputs)
+
+
+def bit_responses(bit: BitRock, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what a bit answers at many points, whatever it hangs on.
+
+    Parameters
+    ----------
+    bit : BitRock
+        The law.
+    rows : array, (N, k)
+        The groups in the order of `GROUP_NAMES`, then the law's own parameters.
+
+    Returns
+    -------
+    now, then : array, (N, 2, 4)
+        Excess of weight and torque per state of the bit, now and τ0 ago.
+    delay : array, (N,)
+        τ0.
+    """
+    mapped = bit_response(paper_plant(bit)).map(len(rows))(rows.T)
+    now, load, past = (
+        value.full().reshape(size, len(rows), -1).transpose(1, 0, 2)
+        for value, size in zip(mapped[:3], (2, 2, 1), strict=True)
+    )
+    return now, load @ past, mapped[3].full().ravel()
 
 
 @by_form

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.strings.line import Line, Piece, Stretch
 from drillctrl.strings.section import Section
 
 STANDARD_GRAVITY = 9.80665
+DEEPEST, HEAVIEST_MUD = 15e3, 3000.0
+_JOINT = 9.6
+# Of a joint, that is worth a piece of its own.
+_LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class DrillString:
     def __post_init__(self) -> None:
         if not self.sections:
             raise InputError("sections", "none", "at least one")
-        checked_number("mud density", self.mud_density, 0.0, 3000.0)
+        checked_number("mud density", self.mud_density, 0.0, HEAVIEST_MUD)
         if self.hoisting_stiffness is not None:
             checked_number("hoisting stiffness", self.hoisting_stiffness, 0.0, 1e12, open_low=True)
 
@@ -77,6 +82,41 @@ class DrillString:
     def length(self) -> float:
         """Length in metres."""
         return sum(section.length for section in self.sections)
+
+    @property
+    def shallowest(self) -> float:
+        """Length with one joint of its uppermost section, m."""
+        top = self.sections[0]
+        joint = top.joint_length if top.joints > 1 else min(top.length, _JOINT)
+        return self.length - top.length + joint
+
+    def at_depth(self, length: float) -> DrillString:
+        """Return the string with pipe added or taken away at its top.
+
+        Parameters
+        ----------
+        length : float
+            Of the whole string, m. What is no whole joint of the uppermost section hangs above
+            it as a short one, its tool joint as much shorter.
+
+        Raises
+        ------
+        InputError
+            If it leaves less than one joint of the uppermost section, or is above 15 km.
+        """
+        length = checked_number("depth", length, self.shallowest, DEEPEST)
+        top = self.sections[0]
+        left = length - (self.length - top.length)
+        if top.tool_joint is None:
+            return replace(self, sections=(replace(top, length=left), *self.sections[1:]))
+        joint = top.joint_length
+        whole = max(1, math.floor(left / joint + 1e-9))
+        pipes = [replace(top, length=whole * joint, joints=whole)]
+        share = left / joint - whole
+        if share > _LEAST_SHARE:
+            tool = replace(top.tool_joint, length=share * top.tool_joint.length)
+            pipes.insert(0, replace(top, length=share * joint, joints=1, tool_joint=tool))
+        return replace(self, sections=(*pipes, *self.sections[1:]))
 
     @property
     def mass(self) -> float:

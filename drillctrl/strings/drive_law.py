@@ -39,6 +39,8 @@ class DriveLaw(Block):
         Inertia of the drive over the unit of inertia.
     """
 
+    control: DriveControl
+
     def __init__(
         self, control: DriveControl, time: float, torque: float, inertia_ratio: float
     ) -> None:

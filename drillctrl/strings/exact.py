@@ -17,6 +17,7 @@ from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.linear import bit_response
+from drillctrl.strings.at_bit import string_at_bit
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.lump import lumped
 from drillctrl.strings.model import PipeString
@@ -133,14 +134,18 @@ def exact_loop(case: Case, top: TopStiffness | None = None) -> ExactLoop:
     case : Case
         What drills, and where.
     top : callable, optional
-        s in 1/s → dynamic stiffness of the drive in N m/rad.
+        s in 1/s → dynamic stiffness of the drive in N m/rad; by default that of the plant's
+        drive under its law.
 
     Raises
     ------
     InputError
-        If the string is another one.
+        If the string is another one, or nothing holds the speed of the drive.
     """
     plant, _ = case.physics("an exact loop")
+    if top is None:
+        known = string_at_bit(plant)
+        top = None if known is None or known.control is None else known.top_stiffness
     if not isinstance(plant.string, PipeString):
         raise InputError("string", type(plant.string).__name__, "a PipeString")
     now, load, then, delay = (v.full() for v in bit_response(plant)(case.parameter_vector))

@@ -1,0 +1,104 @@
+"""What a bit meets of an exact string: how far it gives way, whatever turns the top end."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.errors import InputError
+from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.plant import Plant
+from drillctrl.strings.drill_string import DrillString
+from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.drive_law import DriveLaw
+from drillctrl.strings.lump import lumped
+from drillctrl.strings.model import PipeString
+from drillctrl.strings.slopes import count_growing
+
+# Stands for s = 0, where an integrator has its pole.
+_NEARLY_NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class StringAtBit:
+    """An exact string under its drive, as its bit meets it.
+
+    Attributes
+    ----------
+    string : DrillString
+        The string.
+    control : DriveControl or None
+        Of its drive; None where the speed is imposed.
+    """
+
+    string: DrillString
+    control: DriveControl | None = None
+
+    def receptances(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return displacement per force, m/N, and rotation per torque, rad/(N m), (...).
+
+        Parameters
+        ----------
+        s : complex, (...)
+            1/s.
+        """
+        at = _not_zero(s)
+        u, force, _ = self.string.tension.at_bit(at)
+        if self.control is None:
+            angle, torque, _ = self.string.torsion.at_bit(at)
+        else:
+            # The drive may have poles where its impedance is infinite: its two ends have none.
+            speed, moment = self.control.ends(at)
+            matrix, _ = self.string.torsion.scaled_transfer(at)
+            angle = matrix[..., 0, 0] * speed + matrix[..., 0, 1] * at * moment
+            torque = matrix[..., 1, 0] * speed + matrix[..., 1, 1] * at * moment
+        return np.asarray(u / force), np.asarray(angle / torque)
+
+    def top_stiffness(self, s: ComplexArray) -> ComplexArray:
+        """Return the dynamic stiffness of what turns the top end, N m/rad, (...)."""
+        at = _not_zero(s)
+        if self.control is None:
+            return np.full(at.shape, complex(np.inf))
+        return np.asarray(at * self.control.impedance(at))
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds to the unit of time of dimensionless points, √(I/Kt) of the lumped string."""
+        torsional = lumped(self.string, self.string.torsion)
+        return float(np.sqrt(torsional.mass / torsional.stiffness))
+
+    @functools.cached_property
+    def growing(self) -> int:
+        """Roots of string and drive that grow while the bit is free."""
+        return 0 if self.control is None else count_growing(self.string.torsion, self.control)
+
+
+def _not_zero(s: ComplexArray) -> ComplexArray:
+    return np.asarray(np.where(s == 0.0, _NEARLY_NOTHING, s))
+
+
+def string_at_bit(plant: Plant) -> StringAtBit | None:
+    """Return the exact string of a plant; None if the plant is not a bit on a string of pipe.
+
+    Raises
+    ------
+    InputError
+        If nothing holds the speed of its top drive.
+    """
+    if not isinstance(plant.string, PipeString):
+        return None
+    laws = [block for block in plant.blocks if isinstance(block, DriveLaw)]
+    drives = [block for block in plant.blocks if isinstance(block, TopDrive)]
+    if drives and not laws:
+        wanted = "under a law that holds its speed, such as --structure soft-torque"
+        raise InputError("top drive", "free to turn", wanted)
+    return _at_bit(plant.string.string, laws[0].control if laws else None)
+
+
+@functools.lru_cache(maxsize=64)
+def _at_bit(string: DrillString, control: DriveControl | None) -> StringAtBit:
+    """Return the same object for equal strings, which keeps what it has counted."""
+    return StringAtBit(string, control)
