@@ -26,6 +26,8 @@ from .delay.system import DelaySystem as DelaySystem
 from .designs.design import analyze as analyze
 from .designs.design import design as design
 from .designs.drilling import Drilling as Drilling
+from .designs.drive_design import DriveDesign as DriveDesign
+from .designs.drive_design import design_drive as design_drive
 from .designs.loop_analysis import LoopAnalysis as LoopAnalysis
 from .designs.loop_analysis import analyze_loop as analyze_loop
 from .designs.loops import spectral_abscissas as spectral_abscissas
@@ -134,6 +136,7 @@ from .spectrum.trust import compare_spectra as compare_spectra
 from .spectrum.trust import intervals_for as intervals_for
 from .strings.catalogue import pipe as pipe
 from .strings.catalogue import pipe_names as pipe_names
+from .strings.changed import changed_rig as changed_rig
 from .strings.check import Mode as Mode
 from .strings.check import RigCheck as RigCheck
 from .strings.check import check_rig as check_rig

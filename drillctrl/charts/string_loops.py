@@ -23,7 +23,7 @@ from drillctrl.charts.scan import IntArray
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.linear import bit_responses
 from drillctrl.strings.at_bit import StringAtBit
-from drillctrl.strings.exact import ExactLoop
+from drillctrl.strings.exact import known_loop
 from drillctrl.strings.lump import lumped
 
 # What acts on a bit, and how it moves.
@@ -117,8 +117,7 @@ def exact_count(string: StringAtBit, loads: BitLoads) -> int:
     """
     scale, time = _scales(string)
     now, then = (part[0] / scale for part in loads[:2])
-    top = None if string.control is None else string.top_stiffness
-    loop = ExactLoop(string.string, now, then, float(loads.delay[0]) / time, top)
+    loop = known_loop(string, now, then, float(loads.delay[0]) / time)
     return loop.count_right_of(0.0, 1.2 * time * _highest(string, (loads,)))
 
 

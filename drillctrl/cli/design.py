@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from drillctrl.cli.drives import are_drives, deliver_drive_design
 from drillctrl.cli.gains import read_bounds, scales_at
 from drillctrl.cli.objective import (
     objective_options,
@@ -32,7 +33,8 @@ from drillctrl.cli.verb import Verb
     "--structure",
     default="case1",
     show_default=True,
-    help="p: θ; case1: θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed.",
+    help="p: θ; case1: θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed; of a top "
+    "drive: stiff, soft-torque, z-torque by their rules, dynamic-1 … dynamic-4 optimised.",
 )
 @click.option(
     "--bound",
@@ -75,9 +77,15 @@ def design_command(
       drillctrl design --rig table1 --speed "150 rpm" --rop "20 m/h" --structure case2
       drillctrl design --omega0 10 --delta0 12 --psi 14 --bound K1=-5:5 --json
       drillctrl design --rig table1 --speed "80 rpm" --rop "30 m/h" --limit "0.9 kN*m"
+      drillctrl design --rig vertical-3000 --structure dynamic-2
       drillctrl design --objective worst-case --psi-error 0.2 --min-decay 0.1
     """
     check_outputs(out, plot)
+    if are_drives([structure]):
+        stable = deliver_drive_design(structure, options, as_json, out, plot)
+        if require_stable and not stable:
+            raise click.exceptions.Exit(NOT_STABILISED)
+        return
     objective, requirements = read_objective(options), read_requirements(options)
     surroundings = {name: options.pop(name) for name in SURROUNDINGS}
     where = read_point(options)

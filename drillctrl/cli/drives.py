@@ -11,7 +11,8 @@ from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.gains import gain_scales, read_gains
-from drillctrl.cli.output import check_figure, json_text, write_figure, writing
+from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
+from drillctrl.cli.point import read_point
 from drillctrl.cli.verb import naming
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
 _BEARS = ("rig", "structures", "as_json", "out", *_ALONE)
+_POINT = ("rig", "speed", "rop", "wob", "rock_strength")
+_DESIGN_BEARS = (*_POINT, "structure", "require_stable", "as_json", "out", "plot")
 
 
 def drive_options(command: Command) -> Command:
@@ -132,6 +135,44 @@ def _check_options() -> None:
         if name not in ("speed", "rop", "wob"):
             raise InputError(option, value, "left out for drives: the string alone decides")
         click.echo(f"drillctrl: note: {option} does not bear on drives", err=True)
+
+
+def deliver_drive_design(
+    structure: str,
+    point: Mapping[str, Any],
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+) -> bool:
+    """Find the law of a top drive, print, and write the files asked for.
+
+    Returns
+    -------
+    bool
+        Whether it is stable: with a free bit, and at the point if there is one.
+
+    Raises
+    ------
+    InputError
+        If an option is missing, wrong, or one that does not bear on drives.
+    """
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if typed and name not in _DESIGN_BEARS:
+            wanted = f"left out with --structure {structure}, a law of a top drive"
+            raise InputError(parameter.opts[0], context.params[name], wanted)
+    if point.get("rig") is None:
+        raise InputError("--rig", "(missing)", "given: drives turn a string")
+    from drillctrl.designs.drive_design import design_drive
+    from drillctrl.strings.files import load_rig
+
+    drills = any(point.get(name) is not None for name in _POINT[1:])
+    where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
+    found = design_drive(where, structure)
+    deliver(found.to_dict(), found.summary, found.plot, as_json=as_json, out=out, plot=plot)
+    return found.stable
 
 
 def deliver_drives(

@@ -24,6 +24,7 @@ from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.structures import as_structure
 from drillctrl.simulation.controller import Controller
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.strings.at_bit import string_at_bit
 from drillctrl.synthesis import problem
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
@@ -86,6 +87,9 @@ def design(
     checked_integer("seed", seed, 0, 2**63 - 1)
     workers = checked_integer("workers", workers, 1, 1000)
     case, around = as_case(point), dict(surroundings or {})
+    if case.plant is not None and "drive" not in chosen.inputs:
+        # A top drive that nothing holds turns as it likes, whatever acts at the bit.
+        string_at_bit(case.plant)
     # Names and ranges are checked before any work is done.
     Controller(chosen, *chosen.gains(chosen.lower), **around)
 

@@ -50,19 +50,22 @@ class StringAtBit:
         if self.control is None:
             angle, torque, _ = self.string.torsion.at_bit(at)
         else:
-            # The drive may have poles where its impedance is infinite: its two ends have none.
-            speed, moment = self.control.ends(at)
+            turned, moment = self.top(at)
             matrix, _ = self.string.torsion.scaled_transfer(at)
-            angle = matrix[..., 0, 0] * speed + matrix[..., 0, 1] * at * moment
-            torque = matrix[..., 1, 0] * speed + matrix[..., 1, 1] * at * moment
+            angle = matrix[..., 0, 0] * turned + matrix[..., 0, 1] * moment
+            torque = matrix[..., 1, 0] * turned + matrix[..., 1, 1] * moment
         return np.asarray(u / force), np.asarray(angle / torque)
 
-    def top_stiffness(self, s: ComplexArray) -> ComplexArray:
-        """Return the dynamic stiffness of what turns the top end, N m/rad, (...)."""
+    def top(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return angle and torque at the top, N m/rad, of a motion that the drive allows, (...).
+
+        Both over one factor, so that neither has a pole at s = 0.
+        """
+        assert self.control is not None
         at = _not_zero(s)
-        if self.control is None:
-            return np.full(at.shape, complex(np.inf))
-        return np.asarray(at * self.control.impedance(at))
+        # The drive may have poles where its impedance is infinite: its two ends have none.
+        speed, moment = self.control.ends(at)
+        return speed, np.asarray(at * moment)
 
     @property
     def time_scale(self) -> float:

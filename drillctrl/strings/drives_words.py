@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 
 from drillctrl.base import units
+from drillctrl.strings.drive_control import DriveControl, Transfer
+from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
@@ -81,3 +83,34 @@ def _ordinal(number: int) -> str:
     endings = {1: "st", 2: "nd", 3: "rd"}
     teen = number % 100 in (11, 12, 13)
     return f"{number}{'th' if teen else endings.get(number % 10, 'th')}"
+
+
+def law_text(control: DriveControl) -> str:
+    """Return a law in words: gains of PI control, else its transfer functions of s in 1/s."""
+    integral, rest = without_integral(control.speed)
+    told = []
+    if len(rest.denominator) == 1 and len(rest.numerator) <= 2:
+        gains = [part / rest.denominator[0] for part in rest.numerator]
+        told.append(f"Kp {gains[-1] / 1e3:.4g} kN·m·s/rad, Ki {integral / 1e3:.4g} kN·m/rad")
+        if len(gains) == 2 and gains[0]:
+            told.append(f"inertia compensated {-gains[0]:.4g} kg·m²")
+    else:
+        told.append(f"on speed {_transfer_text(control.speed)} N·m·s/rad")
+    if control.torque:
+        told.append(f"on the pipe's torque {_transfer_text(control.torque)}")
+    return ", ".join(told)
+
+
+def _transfer_text(law: Transfer) -> str:
+    def polynomial(coefficients: Sequence[float]) -> str:
+        powers = range(len(coefficients) - 1, -1, -1)
+        terms = [
+            f"{value:.5g}" + {0: "", 1: " s"}.get(power, f" s^{power}")
+            for value, power in zip(coefficients, powers, strict=True)
+            if value
+        ]
+        return " + ".join(terms).replace("+ -", "− ")
+
+    below = polynomial(law.denominator)
+    above = polynomial(law.numerator)
+    return above if below == "1" else f"({above}) / ({below})"

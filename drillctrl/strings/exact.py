@@ -17,14 +17,17 @@ from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.linear import bit_response
-from drillctrl.strings.at_bit import string_at_bit
+from drillctrl.strings.at_bit import StringAtBit, string_at_bit
 from drillctrl.strings.drill_string import DrillString
+from drillctrl.strings.drive_rules import drive_poles
 from drillctrl.strings.lump import lumped
 from drillctrl.strings.model import PipeString
 from drillctrl.strings.winding import zeros_right_of
 
-# (s per second) → dynamic stiffness of the drive, N m/rad.
+# s in 1/s → dynamic stiffness of the drive, N m/rad.
 TopStiffness = Callable[[ComplexArray], ComplexArray]
+# s in 1/s → angle and torque at the top of a motion that the drive allows.
+TopEnds = Callable[[ComplexArray], tuple[ComplexArray, ComplexArray]]
 
 
 @dataclass(frozen=True)
@@ -40,14 +43,18 @@ class ExactLoop:
     delay : float
         τ0.
     top : callable or None
-        Dynamic stiffness of what turns the top end, in SI; None where its speed is imposed.
+        Angle and torque, in SI, of a motion that the drive allows, both without poles right of
+        the axis but ``poles``; None where its speed is imposed.
+    poles : int
+        Poles of these right of the axis.
     """
 
     string: DrillString
     now: FloatArray
     then: FloatArray
     delay: float
-    top: TopStiffness | None = None
+    top: TopEnds | None = None
+    poles: int = 0
 
     @property
     def rate(self) -> float:
@@ -74,9 +81,14 @@ class ExactLoop:
         torsional = lumped(self.string, self.string.torsion)
         rate = self.rate
         physical = np.asarray(at * rate, dtype=complex)
-        top: npt.ArrayLike = np.inf if self.top is None else self.top(physical)
         x, weight, growth_x = self.string.tension.at_bit(physical)
-        theta, torque, growth = self.string.torsion.at_bit(physical, top)
+        if self.top is None:
+            theta, torque, growth = self.string.torsion.at_bit(physical)
+        else:
+            angle, moment = self.top(physical)
+            matrix, growth = self.string.torsion.scaled_transfer(physical)
+            theta = matrix[..., 0, 0] * angle + matrix[..., 0, 1] * moment
+            torque = matrix[..., 1, 0] * angle + matrix[..., 1, 1] * moment
         late = np.exp(-at * self.delay)[..., None, None]
         response = self.now + late * self.then
         # Per displacement: the bit's velocities are s times these.
@@ -104,7 +116,8 @@ class ExactLoop:
         # The phase turns by about the delays that waves and blades take, per unit of height.
         lines = (self.string.torsion, self.string.tension)
         turning = self.delay + 2.0 * self.rate * sum(line.transit_time for line in lines)
-        return zeros_right_of(self, line, height, int(8.0 * (1.0 + height * turning)))
+        zeros = zeros_right_of(self, line, height, int(8.0 * (1.0 + height * turning)))
+        return zeros + self.poles
 
     def root(self, near: complex) -> complex:
         """Return the root that Newton's method finds from a starting point.
@@ -143,10 +156,28 @@ def exact_loop(case: Case, top: TopStiffness | None = None) -> ExactLoop:
         If the string is another one, or nothing holds the speed of the drive.
     """
     plant, _ = case.physics("an exact loop")
-    if top is None:
-        known = string_at_bit(plant)
-        top = None if known is None or known.control is None else known.top_stiffness
     if not isinstance(plant.string, PipeString):
         raise InputError("string", type(plant.string).__name__, "a PipeString")
     now, load, then, delay = (v.full() for v in bit_response(plant)(case.parameter_vector))
-    return ExactLoop(plant.string.string, now, load @ then, float(delay[0, 0]), top)
+    string, then = plant.string.string, load @ then
+    if top is not None:
+        return ExactLoop(string, now, then, float(delay[0, 0]), _with_stiffness(top))
+    known = string_at_bit(plant)
+    if known is None:
+        raise InputError("plant", "with parts of your own", "a bit on a string under its drive")
+    return known_loop(known, now, then, float(delay[0, 0]))
+
+
+def known_loop(known: StringAtBit, now: FloatArray, then: FloatArray, delay: float) -> ExactLoop:
+    """Return the exact loop of a bit on a string under its drive; see `ExactLoop`."""
+    if known.control is None:
+        return ExactLoop(known.string, now, then, delay)
+    return ExactLoop(known.string, now, then, delay, known.top, drive_poles(known.control))
+
+
+def _with_stiffness(top: TopStiffness) -> TopEnds:
+    def ends(s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        stiffness = np.asarray(top(s), dtype=complex)
+        return np.ones_like(stiffness), stiffness
+
+    return ends
