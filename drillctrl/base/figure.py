@@ -20,6 +20,11 @@ PALETTE = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
 FIGURE_ENDINGS = (".pdf", ".png", ".svg")
 
 
+def axis_name(quantity: str, unit: str = "") -> str:
+    """Return the label of an axis or a colour bar: what is drawn, and in which unit."""
+    return f"{quantity}, {unit or 'dimensionless'}"
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure that belongs to no window.
 

@@ -29,7 +29,7 @@ RIG_AXES: dict[str, tuple[str, Dimension, str]] = {
     "speed": ("rpm", units.ROTARY_SPEED, "rotary speed"),
     "rop": ("m/h", units.SPEED, "rate of penetration"),
     "wob": ("kN", units.FORCE, "weight on bit"),
-    "rock_strength": ("MPa", units.STRESS, "rock strength ε"),
+    "rock_strength": ("MPa", units.STRESS, "rock strength"),
 }
 # Of rigs whose string is known.
 STRING_AXES: dict[str, tuple[str, Dimension, str]] = {

@@ -124,8 +124,8 @@ class StabilityChart:
         )
         return "\n".join(lines)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the chart; see `drillctrl.charts.figure.plot_chart`."""
+    def plot(self, ax: Axes | None = None, name: str | None = None) -> Axes:
+        """Draw the chart, with the name of the rig in its title; see `plot_chart`."""
         from drillctrl.charts.figure import plot_chart
 
         return plot_chart(
@@ -135,6 +135,7 @@ class StabilityChart:
             self.regions,
             rows=self.rows,
             level=self.level,
+            name=name,
             ax=ax,
         )
 

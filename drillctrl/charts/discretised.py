@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
-from drillctrl.base.figure import GREY, ORANGE, new_axes
+from drillctrl.base.figure import GREY, ORANGE, axis_name, new_axes
 from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.figure import axis_text, draw_curves
@@ -74,7 +74,9 @@ class GainSurface:
         drawn = ax.contourf(
             self.x, self.y, self.radius, levels=levels, cmap="cividis", extend="both"
         )
-        ax.figure.colorbar(drawn, ax=ax, label=f"ρ(D), m = {self.m}, order {self.order}")
+        ax.figure.colorbar(
+            drawn, ax=ax, label=axis_name(f"ρ(D) of m = {self.m} and order {self.order}")
+        )
         draw_curves(ax, self.chart.curves, "black", "exact boundary")
         gains = self.optimum.K1.ravel(), self.optimum.K2.ravel()
         vector = self.optimum.structure.vector(*gains) if self.optimum.structure else None
@@ -174,8 +176,8 @@ class RootLocus:
         drawn = ax.scatter(points.real, points.imag, c=many, s=6, cmap="cividis")
         ax.figure.colorbar(drawn, ax=ax, label=axis_text(self.axis))
         ax.set_aspect("equal")
-        ax.set_xlabel("Re")
-        ax.set_ylabel("Im")
+        ax.set_xlabel(axis_name("real part of the eigenvalue"))
+        ax.set_ylabel(axis_name("imaginary part of the eigenvalue"))
         ax.set_title(f"Eigenvalues of D, m = {self.m}, order {self.order}", fontsize="medium")
         ax.legend(loc="lower left", fontsize="small")
         return ax

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from drillctrl.base.figure import BLUE, GREY, PALETTE, new_axes
-from drillctrl.charts.axes import Axis
+from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, new_axes
+from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
+from drillctrl.charts.plane import held_text
+from drillctrl.drilling.gain_units import control_text
+from drillctrl.drilling.quantities import root_scales
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -38,8 +41,8 @@ def label_axes(ax: Axes, plane: Plane) -> None:
     # v0 = δ0 ω0: at one speed, δ0 is proportional to the rate of penetration.
     metres = plane.rig_point.rotary_speed * rig.axial_scale * 3600.0
     twins = {
-        "omega0": (rpm, "rotary speed, rpm"),
-        "delta0": (metres, f"rate of penetration at {_speed_text(plane)}, m/h"),
+        "omega0": (rpm, axis_name("rotary speed", "rpm")),
+        "delta0": (metres, axis_name(f"rate of penetration at {_speed_text(plane)}", "m/h")),
     }
     if plane.x.name in twins:
         factor, text = twins[plane.x.name]
@@ -59,7 +62,7 @@ def _speed_text(plane: Plane) -> str:
 
 
 def axis_text(axis: Axis) -> str:
-    """Return the label of an axis, in words and with its symbol."""
+    """Return the label of an axis: in words, with its symbol, and its unit."""
     words = {
         "omega0": "rotary speed $\\omega_0$",
         "delta0": "nominal depth of cut $\\delta_0$",
@@ -72,26 +75,37 @@ def axis_text(axis: Axis) -> str:
     if axis.name[:1] == "K" and axis.name[1:2].isdigit():
         head, *indices = axis.name.split("_")
         delayed = " on the delayed output" if head == "K2" else ""
-        return f"gain ${head[0]}_{{{','.join([head[1:], *indices])}}}${delayed}"
-    return words.get(axis.name, axis.label)
+        return axis_name(f"gain ${head[0]}_{{{','.join([head[1:], *indices])}}}${delayed}")
+    if axis.name in RIG_AXES:
+        return axis_name(RIG_AXES[axis.name][2], axis.unit)
+    return axis_name(words.get(axis.name, axis.label), axis.unit)
 
 
-def plane_title(plane: Plane) -> str:
-    """Say what is held in the chart."""
-    point = plane.point
-    head = plane.name or "open loop"
-    if point is None:
-        return head
-    held = {
-        "omega0": (f"$\\omega_0$ = {point.omega0:g}", {"speed"}),
-        "delta0": (f"$\\delta_0$ = {point.delta0:g}", {"speed", "rop", "wob", "rock_strength"}),
-        "psi": (f"$\\psi$ = {point.psi:.4g}", {"rock_strength"}),
-        "xi": (f"$\\xi$ = {point.xi:.3g}", {"damping"}),
-        "kappa": (f"$\\kappa$ = {point.kappa:.3g}", {"damping"}),
-    }
-    over = {plane.x.name, plane.y.name}
-    parts = [text for name, (text, also) in held.items() if name not in over and not also & over]
-    return f"{head}: {', '.join(parts)}"
+def plane_title(plane: Plane, name: str | None = None) -> str:
+    """Say what closes the loop, and what is the same all over the chart.
+
+    Parameters
+    ----------
+    plane : Plane
+        The two parameters, and the rest.
+    name : str, optional
+        Of the rig.
+    """
+    held = ", ".join(text for text in (name, held_text(plane)) if text)
+    structure, plant = plane.structure, plane.case.plant
+    if structure is None:
+        # A string may be turned by a drive under a law.
+        head = plane.name or "without control"
+    elif plant is None or _has_gain_axis(plane):
+        head = structure.name
+    else:
+        head = control_text(structure, plane.K1, plane.K2, plant, plane.case.rig)
+    return f"{head}; {held}" if held else head
+
+
+def _has_gain_axis(plane: Plane) -> bool:
+    names = () if plane.structure is None else plane.structure.gain_names
+    return plane.x.name in names or plane.y.name in names
 
 
 def draw_strips(
@@ -165,6 +179,7 @@ def plot_chart(
     *,
     rows: bool,
     level: float = 0.0,
+    name: str | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw one chart: the stable set shaded, the boundary by the frequency that rules it.
@@ -183,6 +198,8 @@ def plot_chart(
         Whether lines are held at y.
     level : float
         σ of the chart.
+    name : str, optional
+        Of the rig, for the title.
     ax : Axes, optional
         By default new ones.
     """
@@ -200,13 +217,16 @@ def plot_chart(
         drawn = LineCollection(
             list(np.concatenate(pieces)), cmap="cividis", linewidths=2.2, zorder=3
         )
-        drawn.set_array(np.concatenate(speeds))
+        rig = plane.case.rig
+        scale = 1.0 if rig is None else root_scales(rig)[1][0]
+        drawn.set_array(scale * np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
         bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
-        bar.set_label("frequency of the crossing root, |Im s|")
+        told = "frequency that sets in there"
+        bar.set_label(axis_name(told, "Hz") if rig else axis_name(f"{told}, |Im s|"))
     _label_regions(ax, plane, regions)
     label_axes(ax, plane)
-    ax.set_title(plane_title(plane), fontsize="medium")
+    ax.set_title(plane_title(plane, name), fontsize="medium")
     counted = "unstable roots" if level == 0.0 else "roots farther right"
     ax.legend(loc="best", fontsize="small", title=f"numbers: {counted}", title_fontsize="small")
     return ax

@@ -264,6 +264,37 @@ class Plane:
         return close_loop(case.system(self.structure.inputs), self.structure, now[0], past[0])
 
 
+_HELD_OF_RIG = {"speed": "{:.4g} rpm", "rop": "{:.4g} m/h", "rock_strength": "rock of {:.4g} MPa"}
+_HELD = {
+    "omega0": "ω0 = {:.4g}",
+    "delta0": "δ0 = {:.4g}",
+    "psi": "ψ = {:.4g}",
+    "xi": "ξ = {:.3g}",
+    "kappa": "κ = {:.3g}",
+}
+# What an axis moves beside itself.
+_MOVES = {
+    "wob": {"rop"},
+    "damping": {"xi", "kappa"},
+    "omega0": {"speed", "rop"},
+    "delta0": {"rop"},
+    "psi": {"rock_strength"},
+    "speed": {"omega0", "delta0"},
+    "rop": {"delta0"},
+    "rock_strength": {"psi", "delta0"},
+}
+
+
+def held_text(plane: Plane) -> str:
+    """Say what is the same everywhere: in the rig's units where there is one."""
+    if plane.point is None:
+        return ""
+    over = {plane.x.name, plane.y.name}
+    over = over.union(*(_MOVES.get(name, set()) for name in over))
+    forms = _HELD if plane.rig_point is None else _HELD_OF_RIG
+    return ", ".join(form.format(plane.value_of(n)) for n, form in forms.items() if n not in over)
+
+
 def check_plane(plane: Plane) -> None:
     """Refuse pairs of axes that contradict one another.
 

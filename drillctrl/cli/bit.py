@@ -9,7 +9,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_json, deliver
-from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.verb import Verb
 
 
@@ -81,7 +81,8 @@ def bit_command(
         ripple=not imposed,
     )
     text = functools.partial(motion_summary, found)
-    deliver(motion_fields(found), text, found.plot, as_json=as_json, out=out, plot=plot)
+    draw = functools.partial(found.plot, name=rig_name(point))
+    deliver(motion_fields(found), text, draw, as_json=as_json, out=out, plot=plot)
 
 
 def _band(

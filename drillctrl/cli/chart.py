@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,10 +21,15 @@ from drillctrl.cli.output import (
     deliver,
     writing,
 )
-from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from drillctrl.charts.chart import StabilityChart
     from drillctrl.charts.stabilisable import StabilisableChart
     from drillctrl.charts.volume import StabilityVolume
@@ -33,8 +40,18 @@ MESH_ENDINGS = (".vtk", ".ply", ".stl")
 
 @click.command(name="chart", cls=Verb)
 @point_options
-@click.option("--x", "x_axis", default="omega0=0.5:25", show_default=True, metavar="NAME=LOW:HIGH")
-@click.option("--y", "y_axis", default="delta0=0:15", show_default=True, metavar="NAME=LOW:HIGH")
+@click.option(
+    "--x",
+    "x_axis",
+    metavar="NAME=LOW:HIGH",
+    help="Default omega0=0.5:25; with a rig speed, from a quarter to twice its own.",
+)
+@click.option(
+    "--y",
+    "y_axis",
+    metavar="NAME=LOW:HIGH",
+    help="Default delta0=0:15; with a rig rop, up to twice its own.",
+)
 @click.option(
     "--structure",
     help="p, case1, pd or case2, or of a top drive: stiff, soft-torque, z-torque, dynamic-2 …; "
@@ -66,8 +83,8 @@ MESH_ENDINGS = (".vtk", ".ply", ".stl")
 )
 @click.option("--plot", metavar="FILE", help="Draw the chart (.png, .svg or .pdf).")
 def chart_command(
-    x_axis: str,
-    y_axis: str,
+    x_axis: str | None,
+    y_axis: str | None,
     structure: str | None,
     k1: str | None,
     k2: str | None,
@@ -103,8 +120,11 @@ def chart_command(
         check_json(out)
     check_folder("--out", out)
     check_figure(plot)
-    x, y = read_axis("--x", x_axis), read_axis("--y", y_axis)
-    where = read_point(with_axes(point, x, y))
+    given_x = None if x_axis is None else read_axis("--x", x_axis)
+    given_y = None if y_axis is None else read_axis("--y", y_axis)
+    where = read_point(with_axes(point, *(axis for axis in (given_x, given_y) if axis)))
+    usual = _usual_axes(where)
+    x, y = given_x or usual[0], given_y or usual[1]
     result: StabilityChart | StabilisableChart | StabilityVolume
     if structure is not None and are_drives([structure]):
         result = _of_drive(where, x, y, structure, (k1, k2), level, optimise or bound, z_axis)
@@ -113,6 +133,7 @@ def chart_command(
     scales = scales_at(where, structure)
     x, y = _gain_axis("--x", x, structure, scales), _gain_axis("--y", y, structure, scales)
     gains = read_gains("K1", k1, scales), read_gains("K2", k2, scales)
+    draw: Callable[[], Figure | Axes] | None = None
     if z_axis is not None:
         if optimise or level or bound:
             raise InputError("--z", z_axis, "left out with --optimise, --bound or --level")
@@ -127,8 +148,23 @@ def chart_command(
             raise InputError("--bound", bound[0], "given only with --optimise")
         from drillctrl.charts.chart import chart
 
-        result = chart(where, x, y, structure, *gains, level=level)
-    deliver(result.to_dict(), result.summary, result.plot, as_json=as_json, out=out, plot=plot)
+        result = drawn = chart(where, x, y, structure, *gains, level=level)
+        draw = functools.partial(drawn.plot, name=rig_name(point))
+    deliver(
+        result.to_dict(), result.summary, draw or result.plot, as_json=as_json, out=out, plot=plot
+    )
+
+
+def _usual_axes(
+    where: OperatingPoint | RigPoint,
+) -> tuple[tuple[str, object, object], tuple[str, object, object]]:
+    """Return the axes where none are typed: what a driller sets, or the paper's."""
+    from drillctrl.drilling.point import RigPoint
+
+    if not isinstance(where, RigPoint):
+        return ("omega0", 0.5, 25.0), ("delta0", 0.0, 15.0)
+    rpm, rop = 30.0 / math.pi * where.rotary_speed, 3600.0 * where.penetration_rate
+    return ("speed", 0.25 * rpm, 2.0 * rpm), ("rop", 0.0, 2.0 * rop or 30.0)
 
 
 def _of_drive(

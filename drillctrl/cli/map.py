@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +11,7 @@ import click
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.cli.axes import read_counted_axis, with_axes
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
-from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.scenario import (
     SURROUNDINGS,
@@ -177,8 +176,7 @@ def map_command(
     if checkpoint is not None:
         _finish(checkpoint)
     if plot is not None:
-        name = None if options["rig"] is None else Path(options["rig"]).stem
-        write_figure(plot, result.plot(shown, name))
+        write_figure(plot, result.plot(shown, rig_name(options)))
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
 
 

@@ -34,12 +34,15 @@ class Wanted:
         For the figure.
     figure : str
         One of `FIGURES`.
+    rig : str or None
+        Its name, for titles.
     """
 
     out: str | None
     every: float | None
     plot: str | None
     figure: str
+    rig: str | None = None
 
     def write(self, run: Simulation, again: Callable[[str], Simulation] | None) -> None:
         """Write motion and figure; ``again`` makes the run of another model."""
@@ -49,7 +52,7 @@ class Wanted:
             out = self.out
             writing("--out", out, lambda: export_motion(run, out, self.every))
         if self.plot is not None:
-            write_figure(self.plot, _drawn(self.figure, run, again))
+            write_figure(self.plot, _drawn(self.figure, run, again, self.rig))
 
     @property
     def files(self) -> str:
@@ -130,7 +133,9 @@ def _tell(run: Simulation, wanted: Wanted) -> None:
     click.echo(f"drillctrl: interrupted: {reached}; kept in {wanted.files}", err=True)
 
 
-def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation] | None) -> Figure:
+def _drawn(
+    figure: str, run: Simulation, again: Callable[[str], Simulation] | None, rig: str | None
+) -> Figure:
     from drillctrl.simulation.figure import (
         plot_against_linear,
         plot_phase_portrait,
@@ -138,15 +143,16 @@ def _drawn(figure: str, run: Simulation, again: Callable[[str], Simulation] | No
     )
 
     if figure == "motion" or (figure == "linear" and again is None):
-        return run.plot()
+        return run.plot(rig)
+    title = run.title(rig)
     if figure == "linear":
         assert again is not None
-        ax = plot_against_linear(run, again("linear"))
+        ax = plot_against_linear(run, again("linear"), title=title)
     elif figure == "face":
-        ax = plot_rock_face(run)
+        ax = plot_rock_face(run, title=title)
     else:
         plane = "torsion" if figure == "phase" else "axial"
-        ax = plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]))
+        ax = plot_phase_portrait(run, plane, since=0.75 * float(run.times[-1]), title=title)
     drawn = ax.get_figure(root=True)
     assert drawn is not None
     return drawn

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -72,6 +74,11 @@ def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
             f"left out where --{next(iter(rig)).replace('_', '-')} gives the point in rig units",
         )
     return _rig_point(rig) if rig else _operating_point(groups)
+
+
+def rig_name(options: Mapping[str, Any]) -> str | None:
+    """Return what a rig is called in titles: its preset, or its file."""
+    return None if options.get("rig") is None else Path(options["rig"]).stem
 
 
 def _operating_point(groups: dict[str, Any]) -> OperatingPoint:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_json, deliver
+from drillctrl.cli.point import rig_name
 from drillctrl.cli.progress import open_stages
 from drillctrl.cli.verb import Command, with_options
 
@@ -72,7 +74,8 @@ def deliver_roots(
     fields = told.to_dict()
     if proof is not None:
         fields["certificate"]["proof"] = dataclasses.asdict(proof)
-    deliver(fields, told.summary, result.plot, as_json=as_json, out=out, plot=plot)
+    draw = functools.partial(result.plot, name=rig_name(click.get_current_context().params))
+    deliver(fields, told.summary, draw, as_json=as_json, out=out, plot=plot)
     if proof is not None and not as_json:
         counted = "undecided" if proof.count is None else f"{proof.count} root(s)"
         click.echo(

@@ -9,7 +9,7 @@ import click
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
 from drillctrl.cli.output import check_figure, check_folder
-from drillctrl.cli.point import point_options, read_point
+from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.roots import NOT_STABILISED
 from drillctrl.cli.scenario import (
     controller_options,
@@ -129,7 +129,7 @@ def simulate_command(
     groups = where.operating_point() if isinstance(where, RigPoint) else where
     length = read_duration(duration, rig)
     step = None if every is None else checked_every(read_time("--every", every, rig), length)
-    wanted = Wanted(out, step, plot, figure)
+    wanted = Wanted(out, step, plot, figure, rig_name(options))
     if starts is not None:
         alone = {"--start": start != "steady", "--initial": initial is not None}
         alone |= {"--floquet": floquet, "--figure linear": figure == "linear"}

@@ -102,14 +102,15 @@ class Analysis(AnalysisValues):
         """Return a text for people, in rig units too where a rig was given."""
         return set_out(result_lines(self))
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the rightmost roots with and without feedback; see `plot_roots`."""
+    def plot(self, ax: Axes | None = None, name: str | None = None) -> Axes:
+        """Draw the rightmost roots with and without feedback, under the name of the rig."""
         from drillctrl.designs.figure import plot_roots
 
         loops = {"without control": self.plant}
         if self.structure is not None:
             loops[f"with {self.structure.name}"] = self.system()
-        return plot_roots(loops, self.loop.dominant_roots, self.point, ax)
+        place = ", ".join(text for text in (name, self.case.place) if text)
+        return plot_roots(loops, self.loop.dominant_roots, place, self.case.rig, ax)
 
 
 class Design(DesignValues, Analysis):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -51,6 +52,17 @@ class Case:
     def rig(self) -> Rig | None:
         """The rig, if one was given."""
         return None if self.rig_point is None else self.rig_point.rig
+
+    @property
+    def place(self) -> str:
+        """Where it drills, for titles: in the units of its rig where there is one."""
+        if self.rig_point is not None:
+            rpm = 30.0 / math.pi * self.rig_point.rotary_speed
+            rop = 3600.0 * self.rig_point.penetration_rate
+            strength = self.rig_point.rig.rock_strength / 1e6
+            return f"{rpm:.4g} rpm, {rop:.4g} m/h, rock of {strength:.4g} MPa"
+        p = self.point
+        return "" if p is None else f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"
 
     @property
     def drills(self) -> bool:

@@ -43,3 +43,36 @@ def rig_gain_units(
     factors, names = gain_units(structure, plant, rig)
     flat = zip(factors.ravel().tolist(), [n for row in names for n in row], strict=True)
     return [(factor, name.replace("·", "*")) for factor, name in flat] * 2
+
+
+def gain_texts(
+    structure: FeedbackStructure, gains: FloatArray, plant: Plant | None, rig: Rig | None
+) -> list[list[str]]:
+    """Return K1 or K2, (m, p), in few digits, with a rig in its units, by rows."""
+    if rig is None or plant is None:
+        return [[f"{gain:.3g}" for gain in row] for row in gains.tolist()]
+    factors, names = gain_units(structure, plant, rig)
+    values = (gains * factors).tolist()
+    return [
+        [_with_unit(value, unit) for value, unit in zip(row, units, strict=True)]
+        for row, units in zip(values, names, strict=True)
+    ]
+
+
+def _with_unit(value: float, unit: str) -> str:
+    """Return a number in few digits, a large one with a k before the newton."""
+    if unit.startswith("N") and abs(value) >= 1e3:
+        return f"{value / 1e3:.3g} k{unit}"
+    return f"{value:.3g} {unit}"
+
+
+def control_text(
+    structure: FeedbackStructure, K1: FloatArray, K2: FloatArray, plant: Plant, rig: Rig | None
+) -> str:
+    """Return a structure and its gains on one line, such as p: K1 = -2 kN·m/rad."""
+    parts = []
+    for label, gains in (("K1", K1), ("K2", K2)):
+        if gains.any():
+            texts = [text for row in gain_texts(structure, gains, plant, rig) for text in row]
+            parts.append(f"{label} = {', '.join(texts)}")
+    return f"{structure.name}: {'; '.join(parts)}" if parts else structure.name

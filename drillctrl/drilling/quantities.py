@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from drillctrl.base.errors import InputError
@@ -17,6 +18,17 @@ SI_UNITS = {
     "torque": "N·m",
     "time": "s",
     "number": "1",
+}
+# What people on rigs read: a unit, and how many of it are one SI unit.
+FIELD_UNITS = {
+    "length": ("mm", 1e3),
+    "axial_rate": ("m/h", 3600.0),
+    "angle": ("rad", 1.0),
+    "angular_rate": ("rpm", 30.0 / math.pi),
+    "force": ("kN", 1e-3),
+    "torque": ("kN·m", 1e-3),
+    "time": ("s", 1.0),
+    "number": ("", 1.0),
 }
 # Rate of change of each quantity that a coordinate may have.
 RATES = {"length": "axial_rate", "angle": "angular_rate"}
@@ -64,6 +76,28 @@ def si_scale(quantity: str, rig: Rig) -> float:
         "time": rig.time_scale,
         "number": 1.0,
     }[quantity]
+
+
+def field_scale(quantity: str, rig: Rig | None) -> tuple[float, str]:
+    """Return how many units of the field one dimensionless unit is, and that unit.
+
+    Without a rig they are 1 and an empty text.
+    """
+    if rig is None:
+        return 1.0, ""
+    unit, factor = FIELD_UNITS[quantity]
+    return si_scale(quantity, rig) * factor, unit
+
+
+def root_scales(rig: Rig | None) -> tuple[tuple[float, str, str], tuple[float, str, str]]:
+    """Return factor, name and unit of a root's real part, and of its imaginary part.
+
+    With a rig growth per second and a frequency in Hz.
+    """
+    if rig is None:
+        return (1.0, "growth rate Re s", ""), (1.0, "angular frequency Im s", "")
+    rate = 1.0 / rig.time_scale
+    return (rate, "growth rate", "1/s"), (rate / (2.0 * math.pi), "frequency", "Hz")
 
 
 def quotient_unit(effort: str, quantity: str) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.figure import BLUE, GREY, ORANGE, new_axes
+from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +21,7 @@ def plot_damping(
     crossings: Sequence[tuple[str, float]] = (),
     unit: str = "",
     label: str | None = None,
+    title: str = "",
     ax: Axes | None = None,
 ) -> Axes:
     """Draw the damping left to a mode over the swing of the bit's speed.
@@ -35,6 +36,8 @@ def plot_damping(
         Of the damping.
     label : str, optional
         Name of the mode.
+    title : str
+        Where that is.
     ax : Axes, optional
         By default new ones.
     """
@@ -49,8 +52,10 @@ def plot_damping(
         told = f"swings by {amplitude:.2g}" if kind == "swing" else f"kick of {amplitude:.2g}"
         ax.axvline(amplitude, color=ORANGE, linestyle="-" if kind == "swing" else "--", label=told)
     ax.set_xscale("log")
-    ax.set_xlabel("swing A of the bit's speed, share of Ω0")
-    ax.set_ylabel(f"damping left{f', {unit}' if unit else ''}")
+    ax.set_xlabel(axis_name("swing A of the bit's speed", "share of Ω0"))
+    ax.set_ylabel(axis_name("damping left to the mode", unit))
+    if title:
+        ax.set_title(title, fontsize="medium")
     if label is not None or crossings:
         ax.legend(fontsize="small")
     return ax

@@ -151,8 +151,15 @@ class DrillingMotion:
     modes: tuple[ModeSwing, ...]
     floor: float | None
 
-    def plot(self, mode: int = 1) -> Axes:
+    def plot(self, mode: int = 1, name: str | None = None) -> Axes:
         """Draw the damping left to a mode over the swing, in SI where there is a rig.
+
+        Parameters
+        ----------
+        mode : int
+            Its number.
+        name : str, optional
+            Of the rig, for the title.
 
         Raises
         ------
@@ -171,6 +178,7 @@ class DrillingMotion:
             [(crossing.kind, crossing.amplitude) for crossing in swing.crossings],
             "" if rig is None else "N·m·s/rad",
             f"torsional mode {swing.mode.number}",
+            ", ".join(text for text in (name, self.case.place) if text),
         )
 
 

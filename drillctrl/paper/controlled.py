@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name
 from drillctrl.charts.discretised import gain_surface
 from drillctrl.charts.figure import draw_curves, label_axes
 from drillctrl.charts.stabilisable import stabilisable_chart
@@ -115,7 +115,8 @@ def figure_13() -> Reproduced:
         ax.plot(motion.times, motion.x, color=BLUE, label="x")
         ax.plot(motion.times, motion.torque, "--", color=ORANGE, label="control u")
         ax.set_title(name, fontsize="medium")
-        ax.set_xlabel("t")
+        ax.set_ylabel(axis_name("bit displacement x, control torque u"))
+        ax.set_xlabel(axis_name("time t"))
         ax.legend(loc="best", fontsize="small")
     rows = []
     published = {"case1": (36.0, 4.75), "case2": (2.6, 5.12)}
@@ -165,9 +166,9 @@ def figure_14() -> Reproduced:
         axes[1].axvspan(start, end, color=GREY, alpha=0.3, linewidth=0, label=label)
     axes[1].plot(late, ORBIT.omega0 + bent.at(late).dtheta, color=BLUE, label="bit speed")
     axes[1].set_xlim(150.0, 200.0)
-    for ax, text in zip(axes, ("θ", "ω0 + θ'"), strict=True):
-        ax.set_xlabel("t")
-        ax.set_ylabel(text)
+    for ax, text in zip(axes, ("bit angle θ", "bit speed ω0 + θ'"), strict=True):
+        ax.set_xlabel(axis_name("time t"))
+        ax.set_ylabel(axis_name(text))
         ax.legend(loc="upper left", fontsize="small")
     part = float(times[np.flatnonzero(np.abs(straight - curved) > 0.05 * np.abs(curved).max())[0]])
     summary = bent.summary
@@ -206,15 +207,16 @@ def figure_15() -> Reproduced:
     axes[0].axvline(on, color=GREY, label="control switched on")
     axes[0].plot(times, motion.theta, color=BLUE, linewidth=0.9, label="θ")
     axes[0].plot(times, motion.torque, "--", color=ORANGE, linewidth=0.9, label="control u")
-    axes[0].set_xlabel("t")
+    axes[0].set_ylabel(axis_name("bit angle θ, control torque u"))
+    axes[0].set_xlabel(axis_name("time t"))
     axes[0].legend(loc="best", fontsize="small")
     before, after = times < on, times >= on
     axes[1].plot(motion.theta[before], motion.dtheta[before], color=GREY, linewidth=0.7,
                  label="before")  # fmt: skip
     axes[1].plot(motion.theta[after], motion.dtheta[after], color=BLUE, linewidth=0.9,
                  label="after")  # fmt: skip
-    axes[1].set_xlabel("θ")
-    axes[1].set_ylabel("θ'")
+    axes[1].set_xlabel(axis_name("bit angle θ"))
+    axes[1].set_ylabel(axis_name("bit speed from steady θ'"))
     axes[1].legend(loc="best", fontsize="small")
     alpha = _abscissa(ORBIT, *AT_ORBIT)
     rows = [

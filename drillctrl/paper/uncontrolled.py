@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drillctrl.base.figure import BLUE, ORANGE
+from drillctrl.base.figure import BLUE, ORANGE, axis_name
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.discretised import root_locus
 from drillctrl.charts.figure import plot_charts
@@ -158,8 +158,8 @@ def figure_8() -> Reproduced:
         motion = run.on_steps(4)
         ax.plot(motion.times, motion.theta, color=BLUE, linewidth=0.7)
         ax.set_title(f"point {name}: ω0 = {omega0:g}, δ0 = {delta0:g}", fontsize="medium")
-        ax.set_xlabel("t")
-        ax.set_ylabel("θ")
+        ax.set_xlabel(axis_name("time t"))
+        ax.set_ylabel(axis_name("bit angle θ"))
     alphas = {name: _alpha(*place) for name, place in POINTS.items()}
     signs = {"B": -1, "C": 1, "D": -1, "E": 1}
     words = {-1: "stable", 1: "unstable"}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_axes, new_figure
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name, new_axes, new_figure
+from drillctrl.drilling.quantities import field_scale
 from drillctrl.simulation.rock_face import rock_face
 from drillctrl.simulation.trace import Trace
 
@@ -16,18 +17,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from drillctrl.drilling.rig import Rig
+
+# Column of the motion → its name, its symbol, and what it measures.
 SIGNALS = {
-    "x": "x",
-    "dx": "x'",
-    "theta": "θ",
-    "dtheta": "θ'",
-    "bit_speed": "bit speed ω0 + θ'",
-    "depth": "depth of cut",
-    "delay": "delay τ",
-    "weight_on_bit": "weight on bit",
-    "torque_on_bit": "torque on bit",
-    "axial": "axial control",
-    "torque": "control u",
+    "x": ("bit displacement", "x", "length"),
+    "dx": ("axial rate of the bit", "x'", "axial_rate"),
+    "theta": ("bit angle", "θ", "angle"),
+    "dtheta": ("bit speed from steady", "θ'", "angular_rate"),
+    "bit_speed": ("bit speed", "ω0 + θ'", "angular_rate"),
+    "depth": ("depth of cut", "", "length"),
+    "delay": ("delay", "τ", "time"),
+    "weight_on_bit": ("weight on bit", "", "force"),
+    "torque_on_bit": ("torque on bit", "", "torque"),
+    "axial": ("axial control", "", "force"),
+    "torque": ("control torque", "u", "torque"),
 }
 PLANES = {"torsion": ("theta", "dtheta"), "axial": ("x", "dx")}
 _SHADES = (
@@ -36,10 +40,36 @@ _SHADES = (
     ("saturated", "control at a limit", "#E69F00", 0.25),
 )
 _PER_STEP = 5
-_TIME = "dimensionless time t"
 
 
-def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
+class Scale(NamedTuple):
+    """How a column of the motion is drawn.
+
+    Attributes
+    ----------
+    factor : float
+        Units that are drawn in one dimensionless unit.
+    label : str
+        Of the axis.
+    """
+
+    factor: float
+    label: str
+
+
+def scale_of(rig: Rig | None, name: str) -> Scale:
+    """Return how a column of the motion, or ``time``, is drawn: in a rig's units if there is one.
+
+    States that are not the bit's are drawn as they are.
+    """
+    words, symbol, quantity = {**SIGNALS, "time": ("time", "t", "time")}.get(
+        name, (name, "", "number")
+    )
+    factor, unit = field_scale(quantity, rig)
+    return Scale(factor, axis_name(words if unit else f"{words} {symbol}".rstrip(), unit))
+
+
+def plot_motion(run: Trace, inputs: Sequence[str] = (), title: str | None = None) -> Figure:
     """Draw axial motion, bit speed and control over time; see `plot_signal`.
 
     Parameters
@@ -48,6 +78,8 @@ def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
         Of `simulate`.
     inputs : sequence of str
         Those that a controller drives.
+    title : str, optional
+        By default it names model and place.
     """
     names = ["x", "bit_speed"]
     names += [name for name in run.input_names if name in inputs]
@@ -59,8 +91,8 @@ def plot_motion(run: Trace, inputs: Sequence[str] = ()) -> Figure:
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         axes[0].legend(handles, labels, loc="upper left", fontsize="small")
-    axes[-1].set_xlabel(_TIME)
-    axes[0].set_title(_title(run))
+    axes[-1].set_xlabel(scale_of(run.case.rig, "time").label)
+    axes[0].set_title(title or title_of(run), fontsize="medium")
     return figure
 
 
@@ -77,21 +109,26 @@ def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
         By default new ones.
     """
     values, times = _signal(run, name)
+    unit = scale_of(run.case.rig, "time").factor
     ax = new_axes(7.2, 2.8) if ax is None else ax
     for phase, label, colour, alpha in _SHADES:
         for i, (start, end) in enumerate(run.phases(phase) if run.model == "nonlinear" else ()):
             told = label if i == 0 else None
-            ax.axvspan(start, end, color=colour, alpha=alpha, linewidth=0, label=told)
+            ax.axvspan(unit * start, unit * end, color=colour, alpha=alpha, linewidth=0, label=told)
     colour = ORANGE if name in run.input_names else BLUE
     ax.plot(times, values, color=colour, linewidth=0.9)
-    ax.set_xlabel(_TIME)
-    ax.set_ylabel(SIGNALS.get(name, name))
+    ax.set_xlabel(scale_of(run.case.rig, "time").label)
+    ax.set_ylabel(scale_of(run.case.rig, name).label)
     ax.margins(x=0)
     return ax
 
 
 def plot_phase_portrait(
-    run: Trace, plane: str = "torsion", ax: Axes | None = None, since: float = 0.0
+    run: Trace,
+    plane: str = "torsion",
+    ax: Axes | None = None,
+    since: float = 0.0,
+    title: str | None = None,
 ) -> Axes:
     """Draw the motion in a plane of states, with what was before ``since`` thin and grey.
 
@@ -104,7 +141,9 @@ def plot_phase_portrait(
     ax : Axes, optional
         By default new ones.
     since : float
-        Such as the time from which an orbit is closed.
+        Such as the dimensionless time from which an orbit is closed.
+    title : str, optional
+        By default it names model and place.
     """
     if plane not in PLANES:
         raise InputError("plane", plane, f"one of {', '.join(PLANES)}")
@@ -112,7 +151,8 @@ def plot_phase_portrait(
     ax = new_axes(5.2, 4.4) if ax is None else ax
     motion = run.on_steps(_PER_STEP)
     early = motion.times <= since
-    x, y = getattr(motion, across), getattr(motion, up)
+    right, high = scale_of(run.case.rig, across), scale_of(run.case.rig, up)
+    x, y = right.factor * getattr(motion, across), high.factor * getattr(motion, up)
     if early.any():
         ax.plot(x[early], y[early], color=GREY, alpha=0.5, linewidth=0.6, label="before")
     late = motion.times >= since
@@ -127,16 +167,21 @@ def plot_phase_portrait(
             linewidth=2.4, label=name,
         )  # fmt: skip
     end = run.at([run.times[-1]])
-    ax.plot(getattr(end, across), getattr(end, up), "o", color=GREEN, markersize=5, label="end")
-    ax.set_xlabel(SIGNALS[across])
-    ax.set_ylabel(SIGNALS[up])
-    ax.set_title(_title(run), fontsize="medium")
+    last = right.factor * getattr(end, across), high.factor * getattr(end, up)
+    ax.plot(*last, "o", color=GREEN, markersize=5, label="end")
+    ax.set_xlabel(right.label)
+    ax.set_ylabel(high.label)
+    ax.set_title(title or title_of(run), fontsize="medium")
     ax.legend(loc="best", fontsize="small")
     return ax
 
 
 def plot_against_linear(
-    nonlinear: Trace, linear: Trace, name: str = "x", ax: Axes | None = None
+    nonlinear: Trace,
+    linear: Trace,
+    name: str = "x",
+    ax: Axes | None = None,
+    title: str | None = None,
 ) -> Axes:
     """Draw a signal of the nonlinear motion over that of the linear one.
 
@@ -149,6 +194,8 @@ def plot_against_linear(
         A column of the motion, or ``bit_speed``.
     ax : Axes, optional
         By default new ones.
+    title : str, optional
+        By default it names signal and place.
     """
     ax = new_axes(7.2, 3.2) if ax is None else ax
     values, times = _signal(nonlinear, name)
@@ -159,15 +206,19 @@ def plot_against_linear(
     reach = high - low
     if other.min() < low - reach or other.max() > high + reach:
         ax.set_ylim(low - reach, high + reach)
-    ax.set_xlabel(_TIME)
-    ax.set_ylabel(SIGNALS.get(name, name))
+    ax.set_xlabel(scale_of(nonlinear.case.rig, "time").label)
+    ax.set_ylabel(scale_of(nonlinear.case.rig, name).label)
     ax.margins(x=0)
-    ax.set_title(f"{SIGNALS.get(name, name)} at {_place(nonlinear)}", fontsize="medium")
+    words = SIGNALS.get(name, (name,))[0]
+    told = f"{words[:1].upper()}{words[1:]} at {nonlinear.case.place}"
+    ax.set_title(title or told, fontsize="medium")
     ax.legend(loc="best", fontsize="small")
     return ax
 
 
-def plot_rock_face(run: Trace, time: float | None = None, ax: Axes | None = None) -> Axes:
+def plot_rock_face(
+    run: Trace, time: float | None = None, ax: Axes | None = None, title: str | None = None
+) -> Axes:
     """Draw the rock that lies ahead of a blade over the next blade pitch.
 
     Parameters
@@ -175,27 +226,33 @@ def plot_rock_face(run: Trace, time: float | None = None, ax: Axes | None = None
     run : Trace
         Of the nonlinear model.
     time : float, optional
-        The instant; by default the end of the run.
+        The instant, dimensionless; by default the end of the run.
     ax : Axes, optional
         By default new ones.
+    title : str, optional
+        By default it names model and place.
     """
     ax = new_axes(6.4, 3.2) if ax is None else ax
     when = float(run.times[-1]) if time is None else time
     face = rock_face(run, when, 361)
     degrees = np.degrees(face.angle)
-    bottom = min(float(face.height.min()), 0.0) - 0.2 * max(float(np.ptp(face.height)), 1e-9)
-    ax.fill_between(degrees, bottom, face.height, color=GREY, alpha=0.35, linewidth=0)
-    ax.plot(degrees, face.height, color="black", linewidth=1.0, label="rock face")
+    rig = run.case.rig
+    (length, unit), (duration, second) = (field_scale(q, rig) for q in ("length", "time"))
+    height = length * face.height
+    bottom = min(float(height.min()), 0.0) - 0.2 * max(float(np.ptp(height)), 1e-9)
+    ax.fill_between(degrees, bottom, height, color=GREY, alpha=0.35, linewidth=0)
+    ax.plot(degrees, height, color="black", linewidth=1.0, label="rock face")
     older = face.passes > 1
     if older.any():
         ax.plot(
-            degrees, np.where(older, face.height, np.nan), color=ORANGE, linewidth=2.0,
+            degrees, np.where(older, height, np.nan), color=ORANGE, linewidth=2.0,
             label="left by an earlier pass",
         )  # fmt: skip
     ax.axhline(0.0, color=BLUE, linestyle="--", linewidth=1.0, label="tip of the blade")
-    ax.set_xlabel("angle ahead of the blade (degrees)")
-    ax.set_ylabel("height above the tip")
-    ax.set_title(f"{_title(run)}, t = {when:.6g}", fontsize="medium")
+    ax.set_xlabel(axis_name("angle ahead of the blade", "°"))
+    ax.set_ylabel(axis_name("height above the tip", unit))
+    told = f"{duration * when:.4g} {second}" if second else f"t = {when:.6g}"
+    ax.set_title(f"{title or title_of(run)}, {told}", fontsize="medium")
     ax.margins(x=0)
     ax.set_ylim(bottom=bottom)
     ax.legend(loc="best", fontsize="small")
@@ -206,17 +263,24 @@ def _signal(run: Trace, name: str) -> tuple[Any, Any]:
     known = ["bit_speed", *run.column_names]
     if name not in known:
         raise InputError("signal", name, f"one of {', '.join(known)}")
-    if name == "bit_speed":
-        motion = run.on_steps(_PER_STEP, names=("dtheta",))
-        return run.point.omega0 + motion.dtheta, motion.times
-    motion = run.on_steps(_PER_STEP, names=(name,))
-    return getattr(motion, name), motion.times
+    unit, factor = scale_of(run.case.rig, "time").factor, scale_of(run.case.rig, name).factor
+    read = "dtheta" if name == "bit_speed" else name
+    motion = run.on_steps(_PER_STEP, names=(read,))
+    mean = run.point.omega0 if name == "bit_speed" else 0.0
+    return factor * (mean + getattr(motion, read)), unit * motion.times
 
 
-def _title(run: Trace) -> str:
-    return f"{run.model.capitalize()} motion at {_place(run)}"
+def title_of(run: Trace, name: str | None = None, control: str | None = None) -> str:
+    """Return a title: the model, the place, and what closes the loop.
 
-
-def _place(run: Trace) -> str:
-    p = run.point
-    return f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"
+    Parameters
+    ----------
+    run : Trace
+        Of `simulate`.
+    name : str, optional
+        Of the rig.
+    control : str, optional
+        Of the controller.
+    """
+    place = ", ".join(text for text in (name, run.case.place) if text)
+    return f"{run.model.capitalize()} motion at {place}" + (f"; {control}" if control else "")

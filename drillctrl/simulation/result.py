@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.gain_units import control_text
 from drillctrl.drilling.rig import Rig
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.past import Past, past_of
@@ -101,12 +103,41 @@ class Simulation(Trace):
         """Figures of the motion over the last quarter of the run."""
         return summarise(self, self.resolved)
 
-    def plot(self) -> Figure:
-        """Draw axial motion, bit speed and control over time; see `plot_motion`."""
+    def title(self, name: str | None = None) -> str:
+        """Return what a figure is headed by: model, rig, place and controller.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the rig.
+        """
+        from drillctrl.simulation.figure import title_of
+
+        return title_of(self, name, self._control_text())
+
+    def _control_text(self) -> str | None:
+        """Say what closes the loop, with its first gains."""
+        if self.controller is None:
+            return "without control"
+        feedback = self.controller.feedback
+        assert isinstance(feedback, FeedbackStructure)
+        _, K1, K2 = self.controller.gain_sets()
+        plant, _ = self.case.physics("a simulation")
+        later = ", later others" if len(K1) > 1 else ""
+        return control_text(feedback, K1[0], K2[0], plant, self.rig) + later
+
+    def plot(self, name: str | None = None) -> Figure:
+        """Draw axial motion, bit speed and control over time; see `plot_motion`.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the rig, for the title.
+        """
         from drillctrl.simulation.figure import plot_motion
 
         inputs = () if self.controller is None else self.controller.feedback.inputs  # type: ignore[union-attr]
-        return plot_motion(self, inputs)
+        return plot_motion(self, inputs, self.title(name))
 
     def to_control(self) -> Any:
         """Return the motion as a python-control ``TimeResponseData``."""

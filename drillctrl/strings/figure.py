@@ -79,7 +79,7 @@ def plot_modes(modes: tuple[Mode, ...], ax: Axes) -> Axes:
         label = f"{mode.frequency:.3g} Hz, {ratio}"
         ax.plot(mode.shape / largest, mode.places, color=colour, label=label)
     ax.axvline(0.0, color=GREY, lw=0.6)
-    ax.set_xlabel("amplitude")
+    ax.set_xlabel("amplitude over the largest, dimensionless")
     ax.set_title(f"{modes[0].kind} modes", fontsize=10)
     ax.legend(fontsize=8, loc="lower left")
     return ax

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_figure
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name, new_figure
 from drillctrl.tables.figure import axis_label
 from drillctrl.tables.grid import Grid
 
@@ -78,7 +78,11 @@ def plot_campaign(
         shown = np.ma.masked_invalid(np.where(low > 0.0, low, np.nan))
         norm = LogNorm(min(float(shown.min()), 0.1 * float(shown.max())), float(shown.max()))
         picture = axes[-1].pcolormesh(x, y, shown.T, shading="nearest", cmap="viridis", norm=norm)
-        figure.colorbar(picture, ax=axes[-1], label="largest size that settles")
+        figure.colorbar(
+            picture,
+            ax=axes[-1],
+            label=axis_name("largest size that settles", "multiples of the disturbance"),
+        )
         axes[-1].set_title("basin", fontsize="medium")
     for ax in axes:
         if min(alpha.shape) > 1 and alpha.min() < 0.0 < alpha.max():

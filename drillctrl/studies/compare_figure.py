@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray
-from drillctrl.base.figure import GREY, PALETTE, new_axes
+from drillctrl.base.figure import GREY, PALETTE, axis_name, new_axes
 from drillctrl.charts.figure import STYLES, Charted, plot_charts
+from drillctrl.drilling.quantities import root_scales
+from drillctrl.simulation.figure import scale_of
 from drillctrl.studies.measures import Response
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from drillctrl.drilling.rig import Rig
 
 
 MARKERS = "osD^v<"
@@ -36,6 +40,7 @@ def plot_responses(
     name: str = "x",
     ax: Axes | None = None,
     model: str = "nonlinear",
+    rig: Rig | None = None,
 ) -> Axes:
     """Draw the motion of stable candidates after the disturbance.
 
@@ -51,23 +56,26 @@ def plot_responses(
         By default new ones.
     model : {"nonlinear", "linear"}
         Which motion it is.
+    rig : Rig, optional
+        In whose units.
     """
     ax = new_axes() if ax is None else ax
     longest = 10.0
+    (unit, time_text), (scale, text) = scale_of(rig, "time"), scale_of(rig, name)
     for label, response in responses.items():
         colour, style = looks[label]
         run = response.run
         longest = max(longest, response.settling_time or 0.25 * run.duration)
         motion = run.on_steps(5)
-        values = getattr(motion, name)
-        ax.plot(motion.times, values, style, color=colour, linewidth=1.1, label=label)
-    ax.set_xlim(0.0, 1.2 * longest)
-    ax.set_xlabel("dimensionless time t")
-    ax.set_ylabel({"theta": "θ", "torque": "control u"}.get(name, name))
+        values = scale * getattr(motion, name)
+        ax.plot(unit * motion.times, values, style, color=colour, linewidth=1.1, label=label)
+    ax.set_xlim(0.0, 1.2 * unit * longest)
+    ax.set_xlabel(time_text)
+    ax.set_ylabel(text)
     ax.set_title(
         f"{model.capitalize()} motion after the disturbance, stable loops", fontsize="medium"
     )
-    ax.legend(loc="best", fontsize="small")
+    _legend(ax)
     return ax
 
 
@@ -93,15 +101,18 @@ def plot_nyquist(loops: Mapping[str, ComplexArray], looks: Looks, ax: Axes | Non
     ax.set_xlim(-3.0, 2.0)
     ax.set_ylim(-2.5, 2.5)
     ax.set_aspect("equal")
-    ax.set_xlabel("Re L(iω)")
-    ax.set_ylabel("Im L(iω), ω > 0")
+    ax.set_xlabel(axis_name("Re L(iω)"))
+    ax.set_ylabel(axis_name("Im L(iω) for ω > 0"))
     ax.set_title("Nyquist curves, loop broken at the input", fontsize="medium")
-    ax.legend(loc="best", fontsize="small")
+    _legend(ax)
     return ax
 
 
 def plot_dominant_roots(
-    dominant: Mapping[str, ComplexArray], looks: Looks, ax: Axes | None = None
+    dominant: Mapping[str, ComplexArray],
+    looks: Looks,
+    ax: Axes | None = None,
+    rig: Rig | None = None,
 ) -> Axes:
     """Draw the dominant roots of every candidate and of the open loop.
 
@@ -113,22 +124,25 @@ def plot_dominant_roots(
         Of `looks`; what has none is grey.
     ax : Axes, optional
         By default new ones.
+    rig : Rig, optional
+        In whose units: growth per second over Hz.
     """
     ax = new_axes() if ax is None else ax
+    (rate, real, per), (turn, imaginary, cycles) = root_scales(rig)
     for i, (label, roots) in enumerate(dominant.items()):
         both = np.concatenate([roots, roots.conj()])
         ax.plot(
-            both.real,
-            both.imag,
+            rate * both.real,
+            turn * both.imag,
             MARKERS[i % len(MARKERS)],
             color=looks[label][0] if label in looks else GREY,
             label=label,
         )
     ax.axvline(0.0, color="black", linewidth=0.8)
-    ax.set_xlabel("Re s")
-    ax.set_ylabel("Im s")
+    ax.set_xlabel(axis_name(real, per))
+    ax.set_ylabel(axis_name(imaginary, cycles))
     ax.set_title("Dominant roots", fontsize="medium")
-    ax.legend(loc="best", fontsize="small")
+    _legend(ax)
     return ax
 
 
@@ -137,3 +151,11 @@ def plot_areas(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
     ax = plot_charts(charts, ax)
     ax.set_title("Where these gains are stable", fontsize="medium")
     return ax
+
+
+def _legend(ax: Axes) -> None:
+    """Name the lines, or say that there are none."""
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="best", fontsize="small")
+    else:
+        ax.text(0.5, 0.5, "no stable loop to show", ha="center", transform=ax.transAxes)

@@ -255,6 +255,7 @@ class Comparison:
         """Draw charts, motions, Nyquist curves and roots; return each with its title."""
         from drillctrl.studies import compare_figure as figure
 
+        rig = self.case.rig
         fed = [row for row in self.rows if row.result.structure is not None]
         looks = figure.looks([row.label for row in fed])
         shown = [row for row in self.rows if row.label in looks]
@@ -271,11 +272,14 @@ class Comparison:
         drawn = [("Stability charts", figure.plot_areas(charts))] if charts else []
         return [
             *drawn,
-            ("Linear axial motion", figure.plot_responses(linear, looks, "x", model="linear")),
-            ("Axial motion", figure.plot_responses(bent, looks, "x")),
-            ("Control", figure.plot_responses(bent, looks, "torque")),
+            (
+                "Linear axial motion",
+                figure.plot_responses(linear, looks, "x", model="linear", rig=rig),
+            ),
+            ("Axial motion", figure.plot_responses(bent, looks, "x", rig=rig)),
+            ("Control", figure.plot_responses(bent, looks, "torque", rig=rig)),
             ("Nyquist curves", figure.plot_nyquist(loops, looks)),
-            ("Dominant roots", figure.plot_dominant_roots(roots, looks)),
+            ("Dominant roots", figure.plot_dominant_roots(roots, looks, rig=rig)),
         ]
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import new_figure
+from drillctrl.base.figure import axis_name, new_figure
 from drillctrl.charts.figure import axis_text
 from drillctrl.charts.plane import Plane
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
@@ -35,11 +35,11 @@ OUTCOMES = {
 # Quantity → text of the colour bar, colours, and its range, which ends where values do; None
 # for no other end. The swing of a bit that hardly turns may be any number.
 _COLOURED: dict[str, tuple[str, str, float, float | None]] = {
-    "swing": ("stick-slip index, swing of the bit's speed (–)", "YlOrRd", 0.0, 2.0),
-    "stick_fraction": ("time in torsional stick (%)", "YlOrRd", 0.0, None),
-    "off_rock_fraction": ("time off the rock (%)", "YlOrRd", 0.0, None),
-    "feed": ("rate of penetration kept (%)", "YlOrRd_r", 0.0, 100.0),
-    "weight_ratio": ("mean over steady weight on bit (–)", "YlOrRd", 1.0, None),
+    "swing": (axis_name("stick-slip index, swing of the bit's speed"), "YlOrRd", 0.0, 2.0),
+    "stick_fraction": (axis_name("time in torsional stick", "%"), "YlOrRd", 0.0, None),
+    "off_rock_fraction": (axis_name("time off the rock", "%"), "YlOrRd", 0.0, None),
+    "feed": (axis_name("rate of penetration kept", "%"), "YlOrRd_r", 0.0, 100.0),
+    "weight_ratio": (axis_name("mean over steady weight on bit"), "YlOrRd", 1.0, None),
 }
 _PERCENT = ("stick_fraction", "off_rock_fraction", "feed")
 SHOWN = ("outcome", *_COLOURED)

@@ -6,26 +6,19 @@ import math
 
 from drillctrl.base.text import set_out, wrapped
 from drillctrl.charts.axes import Axis
-from drillctrl.drilling.gain_units import gain_units
+from drillctrl.charts.plane import held_text
+from drillctrl.drilling.gain_units import control_text
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.status import OUTCOME_NAMED
 from drillctrl.studies.vibration_figure import OUTCOMES
 from drillctrl.studies.vibration_values import MapValues, Severity
 
-_HELD = {"speed": "{:.4g} rpm", "rop": "{:.4g} m/h", "rock_strength": "rock of {:.4g} MPa"}
-_SYMBOLS = {"omega0": "ω0 = {:.4g}", "delta0": "δ0 = {:.4g}", "psi": "ψ = {:.4g}"}
-
 
 def place_text(found: MapValues, name: str | None = None) -> str:
     """Say which rig, rock and starts a map is of; what is an axis is left out."""
-    plane = found.plane
-    over = {plane.x.name, plane.y.name}
-    held = _SYMBOLS if plane.rig_point is None else _HELD
-    if "wob" in over:
-        over |= {"rop"}
-    parts = [form.format(plane.value_of(key)) for key, form in held.items() if key not in over]
-    head = [name] if name else []
-    return f"{', '.join([*head, *parts])}; worst of the starts {', '.join(found.starts)}"
+    held = held_text(found.plane)
+    parts = [text for text in (name, held) if text]
+    return f"{', '.join(parts)}; worst of the starts {', '.join(found.starts)}"
 
 
 def controller_text(found: MapValues) -> str:
@@ -35,32 +28,9 @@ def controller_text(found: MapValues) -> str:
         return "without control"
     if not isinstance(controller, Controller):
         return f"{structure.name}, gains of a table"
-    _, now, past = controller.gain_sets()
+    _, K1, K2 = controller.gain_sets()
     plant, _ = found.plane.case.physics("a map")
-    rig = found.plane.case.rig
-    parts = []
-    for label, gains in (("K1", now[0]), ("K2", past[0])):
-        if not gains.any():
-            continue
-        texts = [f"{gain:.3g}" for gain in gains.ravel().tolist()]
-        if rig is not None:
-            factors, units = gain_units(structure, plant, rig)
-            flat = [unit for row in units for unit in row]
-            texts = [
-                _with_unit(gain * factor, unit)
-                for gain, factor, unit in zip(
-                    gains.ravel().tolist(), factors.ravel().tolist(), flat, strict=True
-                )
-            ]
-        parts.append(f"{label} = {', '.join(texts)}")
-    return f"{structure.name}: {'; '.join(parts)}"
-
-
-def _with_unit(value: float, unit: str) -> str:
-    """Return a gain with few digits, large ones with a k before the newton."""
-    if unit.startswith("N") and abs(value) >= 1e3:
-        return f"{value / 1e3:.3g} k{unit}"
-    return f"{value:.3g} {unit}"
+    return control_text(structure, K1[0], K2[0], plant, found.plane.case.rig)
 
 
 def map_summary(found: MapValues) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.figure import new_figure
+from drillctrl.base.figure import axis_name, new_figure
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.tables.grid import Axis, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, BoolArray, Cells, cell_shape
@@ -35,7 +35,7 @@ def axis_label(axis: Axis) -> str:
     """Return name and unit of an axis for a figure."""
     unit, _ = axis.field_unit
     name = _NAMES.get(axis.name, axis.name.replace("_", " "))
-    return f"{name} ({unit})" if unit else name
+    return axis_name(name, unit)
 
 
 class Drawn(NamedTuple):
@@ -150,6 +150,7 @@ def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
             ax.axvspan(x[i], x[i + 1], fill=False, hatch=hatch, linewidth=0.0, alpha=0.4)
     ax.scatter(x[~table.stable], values[~table.stable], marker="x", c="black", zorder=3)
     ax.set_xlabel(axis_label(axis))
+    ax.set_ylabel(axis_name("α" if column is None else "gain"))
 
 
 def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str, ax: Axes) -> None:
@@ -169,7 +170,7 @@ def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str
     picture = ax.pcolormesh(
         x, y, cut(values).T, shading="nearest", cmap=colours, vmin=low, vmax=reach
     )
-    ax.figure.colorbar(picture, ax=ax)
+    ax.figure.colorbar(picture, ax=ax, label=axis_name("α" if reach else "gain"))
     stable = cut(table.stable)
     at_x, at_y = np.meshgrid(x, y, indexing="ij")
     ax.scatter(at_x[~stable], at_y[~stable], marker="x", c="black", s=18, linewidths=0.9)

@@ -129,7 +129,7 @@ def test_gain_surface_has_the_values_of_single_loops():
     finer = gain_surface(POINT, m=3, order=0, count=41)
     assert finer.lowest[2] < 0.97933 - 1e-3
     ax = finer.plot()
-    assert ax.get_xlabel() == "gain $K_{1,1}$"
+    assert ax.get_xlabel() == "gain $K_{1,1}$, dimensionless"
     with pytest.raises(InputError, match="structure = p"):
         gain_surface(POINT, "p")
 

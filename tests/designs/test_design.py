@@ -149,4 +149,4 @@ def test_roots_are_drawn(point_c):
     drawn = np.vstack([c.get_offsets() for c in ax.collections if len(c.get_offsets())])
     near = np.abs(drawn - [0.009760358, 0.8930716683]).sum(axis=1)
     assert near.min() < 1e-6
-    assert ax.get_xlabel() == "Re s"
+    assert ax.get_xlabel() == "growth rate Re s, dimensionless"

@@ -45,7 +45,7 @@ def test_sticks_and_limits_are_shaded(stick_slip):
         POINT, Controller("case1", [-3.82], [3.61], limit=0.3), duration=20.0, initial=KICK
     )
     assert len(shaded(plot_signal(limited, "torque"))) == len(limited.phases("saturated")) > 0
-    assert [ax.get_ylabel() for ax in limited.plot().axes][-1] == "control u"
+    assert [ax.get_ylabel() for ax in limited.plot().axes][-1] == "control torque u, dimensionless"
 
 
 def test_the_portrait_marks_where_the_bit_stands(stick_slip):
@@ -56,7 +56,7 @@ def test_the_portrait_marks_where_the_bit_stands(stick_slip):
     x, y = (lines["end"].get_xdata()[0], lines["end"].get_ydata()[0])
     end = stick_slip.at([100.0])
     assert (x, y) == (end.theta[0], end.dtheta[0])
-    assert plot_phase_portrait(stick_slip, "axial").get_xlabel() == "x"
+    assert plot_phase_portrait(stick_slip, "axial").get_xlabel().startswith("bit displacement x")
 
 
 def test_small_motion_lies_on_the_linear_one():

@@ -239,7 +239,7 @@ def test_people_read_the_units_of_the_field(on_rig):
     assert "rotary speed 100 … 220 rpm (3), penetration rate 20 … 60 m/h (2)" in on_rig.summary()
     assert "rock strength 60 MPa\n" in on_rig.summary()
     ax = on_rig.plot().axes[0]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("rotary speed (rpm)", "penetration rate (m/h)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("rotary speed, rpm", "penetration rate, m/h")
     low, high = ax.get_xlim()
     assert low < 100.0 < 220.0 < high < 300.0
     # Files and the interface for programs stay in SI units.
