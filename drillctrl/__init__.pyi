@@ -111,6 +111,7 @@ from .robustness.transfer import frequency_response as frequency_response
 from .robustness.transfer import loop_transfer as loop_transfer
 from .simulation.controller import Controller as Controller
 from .simulation.drive_control import drive_controller as drive_controller
+from .simulation.drive_control import law_controller as law_controller
 from .simulation.energy import band_energy as band_energy
 from .simulation.floquet import floquet as floquet
 from .simulation.orbits import limit_cycle as limit_cycle
@@ -121,6 +122,8 @@ from .simulation.run import Interrupted as Interrupted
 from .simulation.run import simulate as simulate
 from .simulation.scenario import Change as Change
 from .simulation.scenario import Scenario as Scenario
+from .simulation.slowing import Slowing as Slowing
+from .simulation.slowing import slow_down as slow_down
 from .simulation.starts import StartRun as StartRun
 from .simulation.starts import StartSet as StartSet
 from .simulation.starts import simulate_starts as simulate_starts

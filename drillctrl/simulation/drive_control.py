@@ -1,4 +1,4 @@
-"""Speed control of a top drive in the simulator: PI with torque limit, delay, lag and sampling."""
+"""Laws of a top drive in the simulator, with torque limit, delay, lag and sampling."""
 
 from __future__ import annotations
 
@@ -6,17 +6,23 @@ import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.case import as_case
+from drillctrl.drilling.bit_rock import BitRock
+from drillctrl.drilling.case import Case, as_case
 from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.structure import structure_of
-from drillctrl.strings.drive_control import DriveControl, Transfer
+from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
+from drillctrl.strings.drive_law import LAW, asking_plant
 from drillctrl.strings.rig import StringRig
 
 _NONE = np.zeros((1, 2))
 _ANY = np.full((1, 2), 1e12)
 SPEED_LOOP = FeedbackStructure(
     "drive speed", ("phi", "dphi"), -_ANY, _ANY, -_NONE, _NONE, ("drive",)
+)  # fmt: skip
+
+LAW_LOOP = FeedbackStructure(
+    "law of the drive", (LAW,), -_ANY[:, :1], _ANY[:, :1], -_NONE[:, :1], _NONE[:, :1], ("drive",)
 )  # fmt: skip
 
 
@@ -63,13 +69,7 @@ def drive_controller(
         raise InputError("encoder of the drive", machine.encoder, "0 in the simulator")
     proportional, integral = _gains(control)
     unit, time = rig.torsional_stiffness, rig.time_scale
-    limit = None
-    if machine.torque_limit is not None:
-        steady = float(structure_of(as_case(where)).arrays.steady[1]) * unit
-        most = checked_number(
-            "torque limit of the drive", machine.torque_limit, steady, 1e9, open_low=True
-        )
-        limit = (most - steady) / unit
+    limit = _spare_torque(as_case(where), machine, unit)
     return Controller(
         SPEED_LOOP,
         [-integral / unit, -proportional / (unit * time)],
@@ -79,6 +79,68 @@ def drive_controller(
         actuator_lag=machine.lag / time,
         period=None if period is None else period / time,
     )
+
+
+def law_controller(
+    where: RigPoint,
+    control: DriveControl,
+    bit: BitRock | None = None,
+    *,
+    period: float | None = None,
+) -> tuple[Case, Controller]:
+    """Return the plant that works out what any law asks of its drive, and the controller for it.
+
+    Parameters
+    ----------
+    where : RigPoint
+        A string under a top drive with inertia, and where it drills.
+    control : DriveControl
+        Any law; filters and states of its own are in the plant. Delay, lag and torque limit of
+        its machine are the controller's, as in `drive_controller`.
+    bit : BitRock, optional
+        The bit–rock law, the paper's without it.
+    period : float, optional
+        Sampling period of the command, s; without it the law is continuous.
+
+    Returns
+    -------
+    Case, Controller
+        What `simulate` takes.
+
+    Raises
+    ------
+    InputError
+        If the rig has no such drive, the law differentiates, or the drive has less torque than
+        steady drilling takes.
+    """
+    rig, machine = where.rig, control.machine
+    if not isinstance(rig, StringRig) or rig.drive is None:
+        raise InputError("rig", type(rig).__name__, "one with a string and a top drive")
+    if control.speed.excess > 0 and not machine.encoder:
+        wanted = "a law without compensated inertia, or a drive with an encoder's filter"
+        raise InputError("control", control.name, wanted)
+    case = as_case(where, asking_plant(rig, control, bit))
+    time = rig.time_scale
+    return case, Controller(
+        LAW_LOOP,
+        [1.0],
+        [0.0],
+        limit=_spare_torque(case, machine, rig.torsional_stiffness),
+        measurement_delay=machine.delay / time,
+        actuator_lag=machine.lag / time,
+        period=None if period is None else period / time,
+    )
+
+
+def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:
+    """Return the torque that a drive has beyond that of steady drilling, dimensionless."""
+    if machine.torque_limit is None:
+        return None
+    steady = float(structure_of(case).arrays.steady[1]) * unit
+    most = checked_number(
+        "torque limit of the drive", machine.torque_limit, steady, 1e9, open_low=True
+    )
+    return (most - steady) / unit
 
 
 def _gains(control: DriveControl) -> tuple[float, float]:

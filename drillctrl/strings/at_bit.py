@@ -93,7 +93,7 @@ def string_at_bit(plant: Plant) -> StringAtBit | None:
     """
     if not isinstance(plant.string, PipeString):
         return None
-    laws = [block for block in plant.blocks if isinstance(block, DriveLaw)]
+    laws = [block for block in plant.blocks if isinstance(block, DriveLaw) and block.acts]
     drives = [block for block in plant.blocks if isinstance(block, TopDrive)]
     if drives and not laws:
         wanted = "under a law that holds its speed, such as --structure soft-torque"

@@ -37,21 +37,33 @@ class DriveLaw(Block):
         Units of time and torque in the plant, s and N m.
     inertia_ratio : float
         Inertia of the drive over the unit of inertia.
+    acts : bool
+        Whether the drive does it; else the law is an output alone, for a controller with limits
+        and a clock to hand on.
     """
 
     control: DriveControl
+    acts: bool
 
     def __init__(
-        self, control: DriveControl, time: float, torque: float, inertia_ratio: float
+        self,
+        control: DriveControl,
+        time: float,
+        torque: float,
+        inertia_ratio: float,
+        acts: bool = True,
     ) -> None:
         super().__init__()
-        self.__dict__.update(control=control, time=time, torque=torque, inertia_ratio=inertia_ratio)
+        self.__dict__.update(
+            control=control, time=time, torque=torque, inertia_ratio=inertia_ratio, acts=acts
+        )
 
     @property
     def form(self) -> Any:
         """The law and its units."""
         own = self.__dict__
-        return DriveLaw, own["control"], own["time"], own["torque"], own["inertia_ratio"]
+        names = ("control", "time", "torque", "inertia_ratio", "acts")
+        return DriveLaw, *(own[name] for name in names)
 
     def signals(self, made: Realisation, c: Coefficients, q: Any) -> Realisation:
         """Return the equations with the law's states and its output."""
@@ -76,7 +88,9 @@ class DriveLaw(Block):
             asked = ca.horzcat(asked + (gain + through) * seen, ca.SX(ca.DM(row[None, :])))
             reference = reference + (gain + through) * led
         drive = made.B[:, made.input_names.index("drive")]
-        if control.machine.delay:
+        if not self.__dict__["acts"]:
+            pass
+        elif control.machine.delay:
             late = Late(made.input_delays["drive"], drive @ asked)
             made = replace(made, late=(*made.late, late))
         else:
@@ -202,4 +216,20 @@ def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = No
     if machine.encoder:
         blocks += [Filtered(name, machine.encoder / time) for name in ("phi", "dphi")]
     blocks.append(DriveLaw(control, time, rig.torsional_stiffness, ratio))
+    return paper_plant(bit, PipeString(rig.string), blocks=tuple(blocks))
+
+
+def asking_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = None) -> Plant:
+    """Return the plant of a rig whose drive is free, with what a law asks of it as an output.
+
+    Parameters are those of `driven_plant`. Lag and delay of the machine are not in it: they are
+    those of the controller that hands the output ``law`` on to the input ``drive``.
+    """
+    machine, time = control.machine, rig.time_scale
+    ratio = machine.inertia / rig.inertia
+    measured = replace(control, machine=replace(machine, lag=0.0, delay=0.0))
+    blocks: list[Block] = [TopDrive(inertia_ratio=ratio)]
+    if machine.encoder:
+        blocks += [Filtered(name, machine.encoder / time) for name in ("phi", "dphi")]
+    blocks.append(DriveLaw(measured, time, rig.torsional_stiffness, ratio, acts=False))
     return paper_plant(bit, PipeString(rig.string), blocks=tuple(blocks))
