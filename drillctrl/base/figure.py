@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,11 @@ FIGURE_ENDINGS = (".pdf", ".png", ".svg")
 def axis_name(quantity: str, unit: str = "") -> str:
     """Return the label of an axis or a colour bar: what is drawn, and in which unit."""
     return f"{quantity}, {unit or 'dimensionless'}"
+
+
+def headline(text: str, columns: int = 64) -> str:
+    """Return a title in lines that fit above the axes."""
+    return "\n".join(textwrap.wrap(text, columns, break_on_hyphens=False))
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -19,6 +19,7 @@ from drillctrl.charts.scanners import choose_scanner, first_position
 from drillctrl.charts.sweep import FIRST_LINES, sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
+from drillctrl.drilling.quantities import root_scales
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,10 +113,11 @@ class StabilityChart:
             )
         frequencies = [curve.omega for curve in self.curves]
         if frequencies:
-            omega = np.concatenate(frequencies)
+            factor, _, unit = root_scales(plane.case.rig)[1]
+            omega = factor * np.concatenate(frequencies)
             lines.append(
                 f"  boundary  {len(self.curves)} curve(s), frequencies {omega.min():.3g} "
-                f"to {omega.max():.3g}"
+                f"to {omega.max():.3g} {unit}".rstrip()
             )
         checked = [region for region in self.regions if region.confirmed is not None]
         agree = sum(bool(region.confirmed) for region in checked)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, new_axes
+from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, headline, new_axes
 from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
 from drillctrl.charts.plane import held_text
@@ -206,6 +206,7 @@ def plot_chart(
     ax = new_axes() if ax is None else ax
     from matplotlib.collections import LineCollection
 
+    _shade_rest(ax, plane, level)
     word = "stable" if level == 0.0 else f"all roots left of {level:g}"
     draw_strips(ax, stable_strips(lines, rows=rows), BLUE, word)
     pieces, speeds = [], []
@@ -221,15 +222,25 @@ def plot_chart(
         scale = 1.0 if rig is None else root_scales(rig)[1][0]
         drawn.set_array(scale * np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
-        bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if plane.rig_point else 0.02)
+        twin = plane.rig_point is not None and plane.y.name == "delta0"
+        bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if twin else 0.02)
         told = "frequency that sets in there"
         bar.set_label(axis_name(told, "Hz") if rig else axis_name(f"{told}, |Im s|"))
     _label_regions(ax, plane, regions)
     label_axes(ax, plane)
-    ax.set_title(plane_title(plane, name), fontsize="medium")
+    ax.set_title(headline(plane_title(plane, name)), fontsize="medium")
     counted = "unstable roots" if level == 0.0 else "roots farther right"
     ax.legend(loc="best", fontsize="small", title=f"numbers: {counted}", title_fontsize="small")
     return ax
+
+
+def _shade_rest(ax: Axes, plane: Plane, level: float) -> None:
+    """Tint the whole of the axes, so that what is not stable is seen to have been computed."""
+    from matplotlib.patches import Rectangle
+
+    corner, size = (plane.x.low, plane.y.low), (plane.x.span, plane.y.span)
+    word = "unstable" if level == 0.0 else "not so"
+    ax.add_patch(Rectangle(corner, *size, facecolor="#F3EDE6", lw=0, zorder=0, label=word))
 
 
 def _label_regions(ax: Axes, plane: Plane, regions: Sequence[Region]) -> None:

@@ -15,6 +15,7 @@ from drillctrl.designs.remedies import Remedy, remedies
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
 from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines
+from drillctrl.drilling.gain_units import gain_texts
 from drillctrl.robustness.margins import ParameterMargin
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.synthesis.boundary import BoundaryDecision, decide
@@ -185,11 +186,14 @@ def _alternative_fields(found: Alternative) -> dict[str, Any]:
 
 def _alternative_lines(found: Alternative) -> Lines:
     other = found.result
-    gains = "; ".join(
-        f"{name} = {', '.join(repr(float(g)) for g in matrix.ravel())}"
+    assert other.structure is not None
+    case = other.case
+    told = {
+        name: [t for row in gain_texts(other.structure, matrix, case.plant, case.rig) for t in row]
         for name, matrix in (("K1", other.K1), ("K2", other.K2))
         if matrix.any()
-    )
+    }
+    gains = "; ".join(f"{name} = {', '.join(texts)}" for name, texts in told.items())
     lines: Lines = [("", ""), ("More robust", gains)]
     if other.trials:
         word = "recommended" if other.recommended else "REFUSED"

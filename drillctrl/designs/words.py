@@ -9,7 +9,7 @@ from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.loop_analysis import LoopAnalysis
 from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.designs.worst_case import WorstCase
-from drillctrl.drilling.gain_units import gain_units
+from drillctrl.drilling.gain_units import gain_texts
 from drillctrl.drilling.steady import steady_state
 from drillctrl.simulation.outcome import Figures
 from drillctrl.simulation.status import Outcome
@@ -155,18 +155,25 @@ def _gain_lines(result: AnalysisValues) -> Lines:
         law += " + K2·(the same, τ0 ago)"
     refused = " (refused)" if result.verdict.refused else ""
     lines: Lines = [("Feedback", f"{structure.name}{refused}: {law}")]
-    rows = [("K1", "", result.K1, structure.K1_lower, structure.K1_upper)]
+    plant, rig = result.case.plant, result.case.rig
+    matrices = [("K1", "", result.K1, structure.K1_lower, structure.K1_upper)]
     if past:
-        rows.append(("K2", " delayed", result.K2, structure.K2_lower, structure.K2_upper))
-    for name, when, gains, low, high in rows:
-        for i in range(gains.shape[0]):
+        matrices.append(("K2", " delayed", result.K2, structure.K2_lower, structure.K2_upper))
+    for name, when, *values in matrices:
+        gains, low, high = (gain_texts(structure, each, plant, rig) for each in values)
+        for i, row in enumerate(gains):
             for j, symbol in enumerate(outputs):
-                text = f"{float(gains[i, j])!r:>22} on {symbol}{when}, "
-                text += f"within [{low[i, j]:g}, {high[i, j]:g}]"
-                if result.case.plant is not None and result.case.rig is not None:
-                    factors, names = gain_units(structure, result.case.plant, result.case.rig)
-                    text += f"  = {gains[i, j] * factors[i, j]:.6g} {names[i][j]}"
-                lines.append((name if j == 0 and i == 0 else "", text))
+                bounds = f"{low[i][j]} to {high[i][j]}"
+                if low[i][j].partition(" ")[2] == high[i][j].partition(" ")[2]:
+                    bounds = f"{low[i][j].partition(' ')[0]} to {high[i][j]}"
+                text = f"{row[j]} on {symbol}{when}, within {bounds}"
+                lines.append((name if i == 0 and j == 0 else "", text))
+    if not result.verdict.refused:
+        label = "To copy" if rig is None else "Dimensionless"
+        for name, _, exact, *_ in matrices:
+            digits = ",".join(repr(float(gain)) for gain in exact.ravel())
+            lines.append((label, f"{name}={digits}"))
+            label = ""
     return lines
 
 

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name, new_axes, new_figure
+from drillctrl.base.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    axis_name,
+    headline,
+    new_axes,
+    new_figure,
+)
 from drillctrl.drilling.quantities import field_scale
 from drillctrl.simulation.rock_face import rock_face
 from drillctrl.simulation.trace import Trace
@@ -92,7 +101,7 @@ def plot_motion(run: Trace, inputs: Sequence[str] = (), title: str | None = None
     if handles:
         axes[0].legend(handles, labels, loc="upper left", fontsize="small")
     axes[-1].set_xlabel(scale_of(run.case.rig, "time").label)
-    axes[0].set_title(title or title_of(run), fontsize="medium")
+    axes[0].set_title(headline(title or title_of(run), 80), fontsize="medium")
     return figure
 
 
@@ -171,7 +180,7 @@ def plot_phase_portrait(
     ax.plot(*last, "o", color=GREEN, markersize=5, label="end")
     ax.set_xlabel(right.label)
     ax.set_ylabel(high.label)
-    ax.set_title(title or title_of(run), fontsize="medium")
+    ax.set_title(headline(title or title_of(run), 56), fontsize="medium")
     ax.legend(loc="best", fontsize="small")
     return ax
 
@@ -211,7 +220,7 @@ def plot_against_linear(
     ax.margins(x=0)
     words = SIGNALS.get(name, (name,))[0]
     told = f"{words[:1].upper()}{words[1:]} at {nonlinear.case.place}"
-    ax.set_title(title or told, fontsize="medium")
+    ax.set_title(headline(title or told, 80), fontsize="medium")
     ax.legend(loc="best", fontsize="small")
     return ax
 
@@ -252,7 +261,7 @@ def plot_rock_face(
     ax.set_xlabel(axis_name("angle ahead of the blade", "°"))
     ax.set_ylabel(axis_name("height above the tip", unit))
     told = f"{duration * when:.4g} {second}" if second else f"t = {when:.6g}"
-    ax.set_title(f"{title or title_of(run)}, {told}", fontsize="medium")
+    ax.set_title(headline(f"{title or title_of(run)}, {told}", 72), fontsize="medium")
     ax.margins(x=0)
     ax.set_ylim(bottom=bottom)
     ax.legend(loc="best", fontsize="small")

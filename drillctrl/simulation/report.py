@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base import units
+from drillctrl.base.text import set_out, wrapped
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
@@ -152,7 +153,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         low, high = (
             units.from_si(v / rig.time_scale, units.ROTARY_SPEED, "rpm") for v in (least, most)
         )
-        speed = f" = {low:.4g} to {high:.4g} rpm"
+        speed = f"{low:.4g} to {high:.4g} rpm = "
     if s.settled:
         motion = _steady(run)
     elif s.period is not None:
@@ -169,6 +170,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     if s.lost_contact:
         kinds.append("the bit leaves the rock")
     lines = [
+        *([] if rig is None else [("Drilling", run.case.place)]),
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
         ("Run", f"{run.model} model, {run.duration:g} time units"
          f"{_seconds(run, run.duration)}, {_ended(run)}"),
@@ -182,8 +184,8 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         values = ", ".join(_complex(value) for value in multipliers.multipliers[:5])
         lines.append(("Multipliers", f"{values} (1 found within {multipliers.trivial_error:.0e})"))
     lines += [
-        ("Bit speed", f"{least:.6g} to {most:.6g}{speed}"),
-        ("Axial", f"x from {lowest:.6g} to {highest:.6g}{_millimetres(run, lowest, highest)}"),
+        ("Bit speed", f"{speed}{least:.6g} to {most:.6g}"),
+        ("Axial", f"{_millimetres(run, lowest, highest)}x from {lowest:.6g} to {highest:.6g}"),
         *_load_lines(run),
         ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
     ]
@@ -196,8 +198,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         limited = f", at a limit for {share:.1%} of the run" if share else ""
         lines.append(("Control", f"largest |u| = {s.max_abs_u:.6g}{torque}{limited}"))
     lines.append(("Effort", f"{s.steps} steps, {s.events} events, {s.elapsed_seconds:.3g} s"))
-    width = max(len(label) for label, _ in lines) + 2
-    return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+    return set_out(lines)
 
 
 def starts_summary(found: StartSet) -> str:
@@ -213,7 +214,8 @@ def starts_summary(found: StartSet) -> str:
         for row in rows
     ]
     worst = found.worst
-    return "\n".join([*lines, f"Worst: {worst.start}, {worst.figures.outcome.sentence}"])
+    told = wrapped(f"Worst: {worst.start}, {worst.figures.outcome.sentence}")
+    return "\n".join([*lines, told])
 
 
 def _cell(value: float | None, form: str) -> str:
@@ -224,7 +226,7 @@ def _millimetres(run: Simulation, *axial: float) -> str:
     if run.rig is None:
         return ""
     low, high = (1e3 * run.rig.axial_scale * x for x in axial)
-    return f" = {low:.4g} to {high:.4g} mm"
+    return f"{low:.4g} to {high:.4g} mm = "
 
 
 def _complex(value: complex) -> str:

@@ -14,17 +14,17 @@ from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.case import Case
+from drillctrl.drilling.gain_units import gain_texts
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.robustness.loop_margins import LoopMargins
 from drillctrl.robustness.margins import DelayMargin, ParameterMargin
 from drillctrl.robustness.radius import StabilityRadius
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 from drillctrl.studies.comparison_text import (
-    COLUMNS,
     LEGEND,
     cells,
     comparison_text,
-    gains_text,
+    headings,
     sentences,
 )
 from drillctrl.studies.measures import Response
@@ -189,7 +189,8 @@ class Comparison:
 
         pushed = ", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items())
         head = f"At {self._point_text()}; disturbance {pushed}; by {self.sort}"
-        return comparison_text(head, [row.to_dict() for row in self.rows])
+        rows = [row.to_dict() for row in self.rows]
+        return comparison_text(head, rows, self._gain_texts(), self.case.rig)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -222,21 +223,22 @@ class Comparison:
 
         rows = [row.to_dict() for row in self.rows]
         designs = [row.result for row in self.rows]
+        gains = self._gain_texts()
         return comparison_page(
             self.figures(),
             point=self._point_text(),
             sort=self.sort,
             disturbance=", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items()),
-            headings=[heading for heading, _, _ in COLUMNS],
-            rows=[(row["label"], row["stable"], cells(row)) for row in rows],
+            headings=headings(self.case.rig),
+            rows=[(row["label"], row["stable"], cells(row, self.case.rig)) for row in rows],
             legend=LEGEND,
             sentences=sentences(rows),
             gains=[
                 (
                     row["label"],
                     ", ".join(design.structure.outputs),
-                    gains_text(row["K1"]),
-                    gains_text(row["K2"]),
+                    gains[row["label"]]["K1"],
+                    gains[row["label"]]["K2"],
                 )
                 for row, design in zip(rows, designs, strict=True)
                 if design.structure is not None
@@ -249,7 +251,24 @@ class Comparison:
     def _point_text(self) -> str:
         """Say where the candidates were compared."""
         point = self._operating_point()
-        return f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
+        groups = f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
+        return groups if self.case.rig is None else f"{self.case.place} ({groups})"
+
+    def _gain_texts(self) -> dict[str, dict[str, str]]:
+        """Return K1 and K2 by label, in a rig's units where there is one."""
+        texts: dict[str, dict[str, str]] = {}
+        for row in self.rows:
+            found, case = row.result, self.case
+            if found.structure is not None:
+                texts[row.label] = {
+                    name: ", ".join(
+                        text
+                        for line in gain_texts(found.structure, gains, case.plant, case.rig)
+                        for text in line
+                    )
+                    for name, gains in (("K1", found.K1), ("K2", found.K2))
+                }
+        return texts
 
     def figures(self) -> list[tuple[str, Axes]]:
         """Draw charts, motions, Nyquist curves and roots; return each with its title."""

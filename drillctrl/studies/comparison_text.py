@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from drillctrl.base.text import WIDTH, wrapped
+from drillctrl.drilling.quantities import field_scale, root_scales
+from drillctrl.drilling.rig import Rig
 
 # Of a row; see `Row.to_dict`.
 Fields = dict[str, Any]
@@ -28,6 +31,13 @@ COLUMNS = (
     ("torsion", "torsional_growth", "{:.3g}"),
     ("trials", "recommended", "{}"),
 )
+# What columns with a unit measure; of a rig they are told in its units.
+_QUANTITIES = {
+    "max_abs_u": "torque",
+    "max_abs_x": "length",
+    "settling_time": "time",
+    "nonlinear_settling_time": "time",
+}
 LEGEND = (
     "α: spectral abscissa; radius: relative error of the plant's matrices that destabilises; "
     "delay ×: factors of the delay between which the loop is stable; peak S: peak sensitivity; "
@@ -42,13 +52,31 @@ LEGEND = (
 )
 
 
-def cells(fields: Fields) -> list[str]:
-    """Return the entries of a row as text."""
+def _scale(name: str, rig: Rig | None) -> tuple[float, str]:
+    """Return factor and unit of a column."""
+    if name == "spectral_abscissa":
+        factor, _, unit = root_scales(rig)[0]
+        return factor, unit
+    return field_scale(_QUANTITIES[name], rig) if name in _QUANTITIES else (1.0, "")
+
+
+def headings(rig: Rig | None) -> list[str]:
+    """Return the heads of the columns, with units where there is a rig."""
+    units = [_scale(name, rig)[1] for _, name, _ in COLUMNS]
+    return [
+        f"{heading}, {unit}" if unit else heading
+        for (heading, _, _), unit in zip(COLUMNS, units, strict=True)
+    ]
+
+
+def cells(fields: Fields, rig: Rig | None = None) -> list[str]:
+    """Return the entries of a row as text, those with a unit in the rig's."""
     found = []
     for _, name, form in COLUMNS:
         value = fields[name]
+        factor = _scale(name, rig)[0]
         if name == "nonlinear_settling_time" and value is None and fields["period"] is not None:
-            found.append(f"T {fields['period']:.4g}")
+            found.append(f"T {factor * fields['period']:.4g}")
         elif value is None:
             found.append("–")
         elif name == "recommended":
@@ -57,16 +85,16 @@ def cells(fields: Fields) -> list[str]:
             longer = "any" if value["longer"] is None else f"{value['longer']:.3g}"
             found.append(f"{value['shorter']:.3g}-{longer}")
         else:
-            found.append(form.format(value))
+            found.append(form.format(value if factor == 1.0 else factor * value))
     return found
 
 
-def gains_text(gains: Sequence[float]) -> str:
-    """Return gains to the digits that a person reads."""
-    return ", ".join(f"{value:.6g}" for value in gains)
-
-
-def comparison_text(head: str, rows: Sequence[Fields]) -> str:
+def comparison_text(
+    head: str,
+    rows: Sequence[Fields],
+    gains: Mapping[str, Mapping[str, str]],
+    rig: Rig | None = None,
+) -> str:
     """Return an aligned table, gains, a legend and what better costs.
 
     Parameters
@@ -75,29 +103,43 @@ def comparison_text(head: str, rows: Sequence[Fields]) -> str:
         Where the candidates were compared, and how.
     rows : sequence of dict
         Of `Row.to_dict`, best first.
+    gains : mapping
+        Texts of K1 and K2 by label.
+    rig : Rig, optional
+        In whose units.
     """
-    table = [["", *(heading for heading, _, _ in COLUMNS)]]
-    table += [[row["label"], *cells(row)] for row in rows]
-    widths = [max(len(row[i]) for row in table) for i in range(len(table[0]))]
-    lines = [head, ""]
-    for row in table:
-        first, *others = (
-            text.ljust(width) if i == 0 else text.rjust(width)
-            for i, (text, width) in enumerate(zip(row, widths, strict=True))
-        )
-        lines.append("  ".join([first, *others]).rstrip())
-    lines.append("")
+    table = [["", *headings(rig)]]
+    table += [[row["label"], *cells(row, rig)] for row in rows]
+    lines = [wrapped(head), "", *_blocks(table)]
     for one in rows:
         if one["structure"] is not None:
             word = "designed" if one["designed"] else "given"
-            now, past = gains_text(one["K1"]), gains_text(one["K2"])
-            lines.append(f"{one['label']} ({word}): K1 = ({now}), K2 = ({past})")
+            told = ", ".join(f"{name} = ({text})" for name, text in gains[one["label"]].items())
+            lines.append(wrapped(f"{one['label']} ({word}): {told}", 2))
     lines.append("")
     for text in sentences(rows):
-        lines += textwrap.wrap(text, 100)
+        lines.append(wrapped(text))
     lines.append("")
-    lines += textwrap.wrap(LEGEND, 100)
+    lines.append(wrapped(LEGEND))
     return "\n".join(lines)
+
+
+def _blocks(table: list[list[str]]) -> list[str]:
+    """Return a table in blocks of columns that fit a terminal, each with the first column."""
+    widths = [max(len(row[i]) for row in table) for i in range(len(table[0]))]
+    lines: list[str] = []
+    start = 1
+    while start < len(widths):
+        stop, used = start, widths[0]
+        while stop < len(widths) and (stop == start or used + 2 + widths[stop] <= WIDTH):
+            used += 2 + widths[stop]
+            stop += 1
+        for row in table:
+            others = [row[i].rjust(widths[i]) for i in range(start, stop)]
+            lines.append("  ".join([row[0].ljust(widths[0]), *others]).rstrip())
+        lines.append("")
+        start = stop
+    return lines
 
 
 def sentences(rows: Sequence[Fields]) -> list[str]:

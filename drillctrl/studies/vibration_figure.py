@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import axis_name, new_figure
+from drillctrl.base.figure import axis_name, headline, new_figure
 from drillctrl.charts.figure import axis_text
 from drillctrl.charts.plane import Plane
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
@@ -129,7 +129,7 @@ def plot_map(
     for ax in grid[:, 0]:
         ax.set_ylabel(axis_text(plane.y))
     for ax, each in zip(grid[0], drawn, strict=True):
-        ax.set_title(each.title, fontsize="medium")
+        ax.set_title(headline(each.title, 48), fontsize="medium")
     _legend(figure, grid, "outcome" in quantities, marked is not None)
     figure.suptitle(title, fontsize="medium")
     return figure
