@@ -25,7 +25,8 @@ _SWING, _STUCK, _FEED = 0.02, 0.02, 0.05
 _APART, _RATE = 0.1, 0.01
 # Less swing that is good where the bit sticks and slips still.
 _HALF = 0.5
-FAILURES = {Outcome.LATE: 1, Outcome.STALLS: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
+# A bit that falls behind bounces ever harder; one that stands still does not.
+FAILURES = {Outcome.STALLS: 1, Outcome.LATE: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
 _QUIET = (Outcome.SETTLES, Outcome.ORBIT, Outcome.BOUNCES)
 NO_GAINS = "there is no feedback to try"
 LEFT_OUT = "the gains have not been tried on the nonlinear motion"

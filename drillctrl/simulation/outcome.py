@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drillctrl.base.arrays import FloatArray
 from drillctrl.simulation.bounds import BEYOND, rate_scales
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
@@ -24,8 +22,6 @@ _SETTLED, _SETTLING, _FALLING = 1e-3, 2e-2, 0.7
 _KEEPS_UP = 0.9
 # Mean weight on bit over the steady one beyond which the bit has fallen behind.
 _PRESSED = 2.0
-# Multiples of a rig's own scale of speed that a motion which grows has passed.
-_LARGE = 3.0
 _PER_STEP = 5
 
 
@@ -99,9 +95,8 @@ def figures(run: Simulation) -> Figures:
 def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
     """Whether a rate has gone beyond anything that a bounded motion of the rig reaches.
 
-    The scale is that of `rate_scales`. Beyond a few times that, a run that broke off at its
-    step limit grew if its amplitude did from each quarter to the next. A bit that falls behind
-    is loaded by what it lags behind on the mean, so that its rates are judged by that load.
+    The scale is that of `rate_scales`. A bit that falls behind is loaded by what it lags behind
+    on the mean, so that its rates are judged by that load.
     """
     if run.status == Status.DIVERGED:
         return True
@@ -114,20 +109,9 @@ def grows_without_bound(run: Simulation, motion: Motion | None = None) -> bool:
         weight += p.eta**2 * max(0.0, -mean)
     scales = rate_scales(p, weight, torque)
     for rate, limit in zip((motion.dx, motion.dtheta), scales, strict=True):
-        sizes = [float(np.abs(rate[part]).max(initial=0.0)) for part in _quarters(motion.times)]
-        if not max(sizes) <= BEYOND * limit:
-            return True
-        rising = all(a < b for a, b in itertools.pairwise(sizes)) and sizes[-1] > 2.0 * sizes[0]
-        if run.status == Status.STEP_LIMIT and rising and sizes[-1] > _LARGE * limit:
+        if not float(np.abs(rate).max()) <= BEYOND * limit:
             return True
     return False
-
-
-def _quarters(times: FloatArray) -> list[slice]:
-    """Return the four quarters of a run as slices of its instants."""
-    edges = np.searchsorted(times, np.linspace(0.0, float(times[-1]), 5))
-    edges[-1] = times.size
-    return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
 
 def _broken(run: Simulation, motion: Motion) -> Outcome | None:
