@@ -90,9 +90,12 @@ class Plane:
         if not given:
             return own
         points = [self._at_rig({k: float(v[i]) for k, v in given.items()}) for i in range(count)]
+        # A string of many elements has no η, ξ and κ.
+        known = self.case.parameters
         groups = {
             field.name: np.array([getattr(point, field.name) for point in points], dtype=float)
             for field in dataclasses.fields(OperatingPoint)
+            if field.name in known
         }
         return {**groups, **own}
 
