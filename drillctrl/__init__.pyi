@@ -79,6 +79,10 @@ from .interop.lifted import pade_approximation as pade_approximation
 from .interop.plants import from_control as from_control
 from .interop.responses import loop_frd as loop_frd
 from .interop.responses import to_frd as to_frd
+from .motion.band import BitBand as BitBand
+from .motion.band import RationalResponse as RationalResponse
+from .motion.band import bit_band as bit_band
+from .motion.exponents import orbit_exponents as orbit_exponents
 from .motion.loop import torsional_system as torsional_system
 from .motion.orbit import AxialOrbit as AxialOrbit
 from .motion.orbit import axial_orbit as axial_orbit

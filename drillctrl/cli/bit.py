@@ -33,6 +33,7 @@ from drillctrl.cli.verb import Verb
     is_flag=True,
     help="Impose the rotation whole: no ripple beside the swing.",
 )
+@click.option("--band", is_flag=True, help="Over frequency instead, at the first amplitude (0.1).")
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json.")
@@ -42,6 +43,7 @@ def bit_command(
     modes: int,
     most_periods: int,
     imposed: bool,
+    band: bool,
     workers: int,
     as_json: bool,
     out: str | None,
@@ -58,11 +60,15 @@ def bit_command(
     Examples:
       drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --amplitudes 0.03,0.3
       drillctrl bit --rig table1 --speed "120 rpm" --rop "50 m/h" --plot bit.png
+      drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --band --plot band.png
     """
     check_json(out)
     check_figure(plot)
     wanted = _read(amplitudes)
     where = read_point(point)
+    if band:
+        _band(where, wanted, workers, most_periods, imposed, as_json, out, plot)
+        return
     from drillctrl.motion.report import motion_fields, motion_summary
     from drillctrl.motion.swing import AMPLITUDES, drilling_motion
 
@@ -77,6 +83,29 @@ def bit_command(
     text = functools.partial(motion_summary, found)
     draw = functools.partial(found.plot, name=rig_name(point))
     deliver(motion_fields(found), text, draw, as_json=as_json, out=out, plot=plot)
+
+
+def _band(
+    where: Any,
+    amplitudes: list[float] | None,
+    workers: int,
+    most_periods: int,
+    imposed: bool,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+) -> None:
+    """Tell the response over a band of frequencies."""
+    from drillctrl.motion.band import bit_band
+    from drillctrl.motion.report import band_fields, band_summary
+
+    amplitude = 0.1 if not amplitudes else amplitudes[0]
+    found = bit_band(
+        where, amplitude, workers=workers, most_periods=most_periods, ripple=not imposed
+    )
+    fields = {"schema": "drillctrl/bit-band/1", **band_fields(found)}
+    text = functools.partial(band_summary, found)
+    deliver(fields, text, found.plot, as_json=as_json, out=out, plot=plot)
 
 
 def _read(amplitudes: str | None) -> list[float] | None:

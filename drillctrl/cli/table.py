@@ -99,7 +99,7 @@ def table_command(
       drillctrl table --omega0 4:24:21 --delta0 0.25:12:16 --psi 14 --out gains.csv
       drillctrl table --rig table1 --speed "140:260:7 rpm" --rop "10:60:6 m/h" --out gains.csv
       drillctrl table --omega0 8:20:5 --delta0 1:7:4 --out gains.c --period 0.01 --limit 5
-
+      drillctrl table --rig table1 --speed "110:120:2 rpm" --structure pd --objective drilling
 
     With --out a run that was killed goes on where it was when it is started again.
     """
@@ -144,7 +144,6 @@ def _design(
     """Return the table that the options ask for, where its designs are kept, and its units."""
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.base.workers import open_executor
-    from drillctrl.designs.drilling import Drilling
     from drillctrl.drilling.structures import preset_structure
     from drillctrl.synthesis.objectives import Exact
     from drillctrl.tables.table import table
@@ -157,8 +156,6 @@ def _design(
     smooth = checked_number("smooth", options["smooth"], 0.0, 90.0)
     trials = wants_trials(options["trials"])
     objective = read_objective(options) or Exact()
-    if isinstance(objective, Drilling):
-        raise InputError("--objective", objective.name, "another one in tables")
     if smooth and not isinstance(objective, Exact):
         raise InputError("smooth", smooth, f"0 with --objective {objective.name}")
     grid = read_grid(options)
@@ -166,7 +163,7 @@ def _design(
     scales = gain_scales(structure, grid.plant, grid.rig)
     structure = structure.with_bounds(read_bounds(options["bound"], structure, scales))
     controller = _in_units(controller, grid)
-    _check_out(out, controller, grid, structure)
+    _check_out(out, controller, grid, structure, trials)
     with (
         open_executor(workers or 1, scheduler) as executor,
         nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,
@@ -181,11 +178,24 @@ def _design(
             fallback=options["fallback"],
             seed=options["seed"],
             trials=trials,
+            surroundings=_surroundings(controller, grid),
             executor=executor,
             checkpoint=checkpoint,
             progress=progress,
         )
     return result, checkpoint, controller
+
+
+def _surroundings(controller: dict[str, Any], grid: Grid) -> dict[str, float]:
+    """Return clock and limit of the controller in trial runs, dimensionless."""
+    rig = grid.rig
+    unit = {
+        "period": 1.0 if rig is None else rig.time_scale,
+        "limit": 1.0 if rig is None else rig.torsional_stiffness,
+    }
+    return {
+        name: float(controller[name]) / unit[name] for name in unit if controller[name] is not None
+    }
 
 
 def _in_units(controller: dict[str, Any], grid: Grid) -> dict[str, Any]:
@@ -206,13 +216,17 @@ def _in_units(controller: dict[str, Any], grid: Grid) -> dict[str, Any]:
 
 
 def _check_out(
-    out: str | None, controller: dict[str, Any], grid: Grid, structure: FeedbackStructure
+    out: str | None,
+    controller: dict[str, Any],
+    grid: Grid,
+    structure: FeedbackStructure,
+    tried: bool = False,
 ) -> None:
     """Refuse what could not be written, before any work is done."""
     ending = "" if out is None else Path(out).suffix.lower()
     if ending not in CONTROLLERS:
         for name, value in controller.items():
-            if value is not None:
+            if value is not None and not (tried and name in ("period", "limit")):
                 raise InputError(name, value, "left out unless --out ends in .c or .st")
     if out is None:
         return

@@ -100,7 +100,7 @@ class Swing:
     response : complex
         H. NaN where a run broke off.
     error : float
-        Of |H|, infinite where a run broke off.
+        Of its modulus, infinite where a run broke off.
     growth : float
         Rate without control, NaN where H is not known.
     growth_error : float

@@ -1,4 +1,4 @@
-"""The figure of the damping left. It takes arrays and matplotlib Axes, or makes them."""
+"""Figures of the damping left and of the response. They take arrays and Axes, or make them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drillctrl.base.arrays import FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes
 
 if TYPE_CHECKING:
@@ -58,4 +58,46 @@ def plot_damping(
         ax.set_title(title, fontsize="medium")
     if label is not None or crossings:
         ax.legend(fontsize="small")
+    return ax
+
+
+def plot_response(
+    frequencies: FloatArray,
+    values: ComplexArray,
+    errors: FloatArray,
+    model: tuple[FloatArray, ComplexArray],
+    with_rig: bool,
+    label: str,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the bit's response over frequency.
+
+    Parameters
+    ----------
+    frequencies, values, errors : array, (k,)
+        Hz or ω; H; and its error, infinite where it is not known.
+    model : tuple of frequencies and values
+        Of the rational model.
+    with_rig : bool
+        Whether they are in rig units.
+    label : str
+        What is drawn.
+    ax : Axes, optional
+        By default new ones.
+    """
+    ax = new_axes(6.4, 4.2) if ax is None else ax
+    known = np.isfinite(errors)
+    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    for part, colour, name in (("real", BLUE, "Re H, damps"), ("imag", ORANGE, "Im H")):
+        ax.errorbar(
+            frequencies[known], getattr(values[known], part), errors[known],
+            color=colour, marker="o", markersize=3, linestyle="none", capsize=2, label=name,
+        )  # fmt: skip
+        ax.plot(model[0], getattr(model[1], part), color=colour, linewidth=1.1)
+    ax.set_xscale("log")
+    cycles, unit = ("Hz", "N·m·s/rad") if with_rig else ("", "")
+    ax.set_xlabel(axis_name("frequency" if with_rig else "frequency ω", cycles))
+    ax.set_ylabel(axis_name("H, torque of the bit per speed", unit))
+    ax.set_title(f"the bit's answer, {label}; lines: rational model", fontsize="medium")
+    ax.legend(fontsize="small")
     return ax

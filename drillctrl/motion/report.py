@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.quantities import si_scale
+from drillctrl.motion.band import BitBand
 from drillctrl.motion.orbit import AxialOrbit
 from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
+from drillctrl.spectrum.roots import spectral_abscissa
 
 
 class Units(NamedTuple):
@@ -181,3 +183,62 @@ def verdict(swing: ModeSwing) -> list[str]:
         listed = ", ".join(f"{a:.3g}" for a in unsure)
         told.append(f"Not sure at A = {listed}: the simulator must decide there.")
     return told
+
+
+def band_fields(found: BitBand) -> dict[str, Any]:
+    """Return the JSON fields of a band; in SI where there is a rig."""
+    units = units_of(found.case)
+    model = found.rational()
+    growth = spectral_abscissa(found.system())
+    return {
+        "samples": [
+            {
+                "frequency": each.frequency / units.time,
+                "amplitude": each.amplitude,
+                "response_re": _number(each.value.real * units.response),
+                "response_im": _number(each.value.imag * units.response),
+                "response_error": _number(each.error * units.response),
+            }
+            for each in found.responses
+        ],
+        "model": {
+            "constant": model.constant * units.response,
+            "poles": [[p.real / units.time, p.imag / units.time] for p in model.poles.tolist()],
+            "residues": [
+                [r.real * units.response / units.time, r.imag * units.response / units.time]
+                for r in model.residues.tolist()
+            ],
+            "error": model.error * units.response,
+        },
+        "growth_rate": growth / units.time,
+        "growing_roots": found.count_growing(),
+    }
+
+
+def band_summary(found: BitBand) -> str:
+    """Return what is told of a band on a terminal."""
+    units, model = units_of(found.case), found.rational()
+    rig = bool(units.rate_name)
+    amplitude = sum(each.amplitude for each in found.responses) / len(found.responses)
+    unit = f", {units.response_name}" if rig else ""
+    lines = [
+        f"H over frequency at a swing of {amplitude:.3g}{unit}",
+        f"{'Hz' if rig else 'ω':>9} {'Re H':>9} {'Im H':>9} {'±':>7}",
+    ]
+    for each in found.responses:
+        place = each.frequency / units.time / (2.0 * math.pi if rig else 1.0)
+        value, error = each.value * units.response, each.error * units.response
+        lines.append(f"{place:9.4g} {value.real:9.4g} {value.imag:9.4g} {error:7.2g}")
+    growth = spectral_abscissa(found.system()) / units.time
+    counted = found.count_growing()
+    told = (
+        "cannot be told from the band" if counted is None else f"{counted}, counted with H itself"
+    )
+    return "\n".join(
+        [
+            *lines,
+            f"Rational model: {model.poles.size} poles, within {model.error * units.response:.2g}.",
+            f"Torsional loop with it: growth rate {growth:.4g}{' 1/s' if rig else ''}; growing "
+            f"roots: {told}.",
+        ]
+    )

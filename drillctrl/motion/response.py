@@ -47,8 +47,8 @@ class BitResponse:
         H, amplitude of the torque on bit over that of the speed; a positive real part damps.
         NaN where a run broke off. At −ω it is the conjugate.
     error : float
-        Of |H|: twice the standard error of the mean over windows, or half the difference of
-        the two starts where that is more; infinite where a run broke off.
+        Of the modulus of H: twice the standard error of the mean over windows, or half the
+        difference of the two starts where that is more; infinite where a run broke off.
     windows : complex array, (w,)
         H in each window, those of one start after those of the other.
     starts : complex array, (2,)

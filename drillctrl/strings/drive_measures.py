@@ -30,7 +30,7 @@ class DriveMode:
     slope : ModeSlope
         Its critical slope.
     reflection : float
-        |r| of the drive at the frequency of the mode under a held top.
+        ``|r|`` of the drive at the frequency of the mode under a held top.
     threshold_speed : float
         rad/s, above which the falling torque is less steep than the critical slope.
     root : DriveRoot or None
@@ -77,7 +77,7 @@ class DriveMeasures:
     frequencies : array, (q,)
         Hz.
     reflection, impedance : array, (q,)
-        |r| and Z there, N m s/rad.
+        ``|r|`` and Z there, N m s/rad.
     roots : tuple of DriveRoot
         With a free bit, up to the last of these frequencies.
     """

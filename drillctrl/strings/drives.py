@@ -80,7 +80,7 @@ class DriveComparison:
         return comparison_summary(self.rig, self.falling, self.drives)
 
     def plot(self) -> Figure:
-        """Draw |r|, impedance, and damping over frequency; see `plot_drives`."""
+        """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`."""
         from drillctrl.strings.drives_figure import plot_drives
 
         curves = {

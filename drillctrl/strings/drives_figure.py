@@ -20,12 +20,12 @@ _COLOURS = (GREY, BLUE, GREEN, ORANGE, "#CC79A7", "#56B4E9", "#E69F00")
 
 
 def plot_drives(drives: Mapping[str, Curves], pipe: float) -> Figure:
-    """Draw |r|, |Z| and Re Z over ζ, and the damping of modes with a free bit.
+    """Draw ``|r|``, ``|Z|`` and Re Z over ζ, and the damping of modes with a free bit.
 
     Parameters
     ----------
     drives : mapping
-        Name → frequencies in Hz, |r|, Z in N m s/rad, and roots.
+        Name → frequencies in Hz, ``|r|``, Z in N m s/rad, and roots.
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
     """

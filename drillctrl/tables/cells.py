@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,7 +36,7 @@ _STEPS = (0.25, 0.125, 0.0625, 0.03)
 _MISSED = 0.1
 _DESCENT = 60
 # Cells of one task.
-_TOGETHER = 64
+TOGETHER = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,8 @@ class CellTask:
         Nodes that are stable.
     cells : int array, (c,)
         Which ones.
+    surroundings : mapping
+        Of the controller in trial runs.
     """
 
     grid: Grid
@@ -60,18 +62,24 @@ class CellTask:
     gains: FloatArray
     stable: BoolArray
     cells: IntArray
+    surroundings: Mapping[str, float] = field(default_factory=dict)
 
 
 def cell_tasks(
-    grid: Grid, structure: FeedbackStructure, gains: FloatArray, stable: BoolArray
+    grid: Grid,
+    structure: FeedbackStructure,
+    gains: FloatArray,
+    stable: BoolArray,
+    surroundings: Mapping[str, float] | None = None,
+    together: int = TOGETHER,
 ) -> list[CellTask]:
     """Return tasks that together check every cell."""
     every = np.arange(math.prod(cell_shape(grid)))
     # A copy leaves behind what the grid has worked out and a task need not carry.
     bare = dataclasses.replace(grid)
     return [
-        CellTask(bare, structure, gains, stable, every[i : i + _TOGETHER])
-        for i in range(0, every.size, _TOGETHER)
+        CellTask(bare, structure, gains, stable, every[i : i + together], surroundings or {})
+        for i in range(0, every.size, together)
     ]
 
 

@@ -38,6 +38,7 @@ def design_grid(
     run: Mapper,
     objective: Objective = EXACT,
     known: Mapping[int, NodeDesign] | None = None,
+    surroundings: Mapping[str, float] | None = None,
 ) -> list[NodeDesign]:
     """Design every node of a grid.
 
@@ -61,6 +62,8 @@ def design_grid(
         Other than the exact abscissa, each node is designed on its own.
     known : mapping of int to NodeDesign, optional
         Designs of some nodes; all others begin at those beside them.
+    surroundings : mapping, optional
+        Of the controller in the runs of designs on the motion that is drilled with.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def design_grid(
     found = dict(known or {})
     if not isinstance(objective, Exact):
         alone = [
-            NodeTask(i, case, structure, seed, objective=objective)
+            NodeTask(i, case, structure, seed, objective=objective, surroundings=surroundings or {})
             for i, case in enumerate(grid.cases)
             if i not in found
         ]

@@ -282,7 +282,7 @@ def _check_consistency(table: GainTable, document: Document) -> None:
     if (table.spectral_abscissa[table.stable] >= 0.0).any():
         raise ValueError("a stable node with a positive spectral abscissa")
     vouched = table.cells.mode != UNSAFE
-    if (table.cells.spectral_abscissa[vouched] >= 0.0).any():
+    if not table.on_motion and (table.cells.spectral_abscissa[vouched] >= 0.0).any():
         raise ValueError("a cell that is vouched for with a positive spectral abscissa")
     if not table.sound[corners_of(table.grid)[vouched]].all():
         raise ValueError("a cell that is vouched for with a node that is not")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import design
+from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.loop_analysis import analyze_loop
 from drillctrl.designs.verdict import try_gains
 from drillctrl.drilling.case import Case
@@ -59,6 +61,8 @@ class NodeTask:
         The active roots there, as many as ``known`` or none; each may be empty.
     objective : Objective
         What is minimised; only the exact abscissa begins at ``known``.
+    surroundings : mapping
+        Limits, clock and delays of the controller in trial runs.
     """
 
     index: int
@@ -69,6 +73,7 @@ class NodeTask:
     objective: Objective = EXACT
     trials: bool = False
     active: tuple[tuple[ActiveRoot, ...], ...] = ()
+    surroundings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +94,8 @@ class NodeDesign:
         Ends of the other descents, best first.
     roots : tuple of ActiveRoot
         The active ones, where the gains were sharpened on them.
+    refusal : str or None
+        Why a design on the motion that is drilled with is not recommended.
     """
 
     index: int
@@ -97,6 +104,7 @@ class NodeDesign:
     stationarity: float
     basins: tuple[FloatArray, ...]
     roots: tuple[ActiveRoot, ...] = ()
+    refusal: str | None = None
 
 
 def design_node(task: NodeTask) -> NodeDesign:
@@ -151,8 +159,14 @@ def _searched(family: LoopFamily, task: NodeTask) -> Search:
 
 def _design_otherwise(task: NodeTask) -> NodeDesign:
     """Minimise another objective than the abscissa, by the same route as `design`."""
+    on_motion = isinstance(task.objective, Drilling)
     result = design(
-        task.case, task.structure, objective=task.objective, seed=task.seed, trials=False
+        task.case,
+        task.structure,
+        objective=task.objective,
+        seed=task.seed,
+        trials=on_motion,
+        surroundings=task.surroundings,
     )
     return NodeDesign(
         task.index,
@@ -160,6 +174,7 @@ def _design_otherwise(task: NodeTask) -> NodeDesign:
         result.spectral_abscissa,
         result.optimality.stationarity,
         (),
+        refusal=result.reason if on_motion and not result.recommended else None,
     )
 
 
@@ -186,7 +201,14 @@ def check_node(task: NodeTask) -> NodeCheck:
     off = no_control(structure)
     refusal = None
     if task.trials and (gains != off).any():
-        verdict = try_gains(task.case, structure, *structure.gains(gains), loop.stable, spare=True)
+        verdict = try_gains(
+            task.case,
+            structure,
+            *structure.gains(gains),
+            loop.stable,
+            spare=True,
+            surroundings=task.surroundings,
+        )
         if verdict.refused:
             refusal, loop = verdict.reason, analyze_loop(family.loop(off))
     return NodeCheck(
@@ -217,6 +239,7 @@ def find_design(checkpoint: Checkpoint, task: NodeTask) -> NodeDesign | None:
         entry["stationarity"],
         tuple(np.array(basin) for basin in entry["basins"]),
         tuple(ActiveRoot(*root) for root in entry["roots"]),
+        entry["refusal"],
     )
 
 
@@ -234,6 +257,7 @@ def keep_design(checkpoint: Checkpoint, task: NodeTask, design: NodeDesign) -> N
         "stationarity": float(design.stationarity),
         "basins": [basin.tolist() for basin in design.basins],
         "roots": [dataclasses.astuple(root) for root in design.roots],
+        "refusal": design.refusal,
     }
     checkpoint.keep(task_key(task), entry)
 
@@ -253,6 +277,6 @@ def task_key(task: NodeTask) -> str:
     plant, where = task.case.physics("a table")
     point = (*dataclasses.astuple(where), plant.text)
     active = [[dataclasses.astuple(root) for root in roots] for roots in task.active]
-    rest = task.seed, known, active, task.objective
+    rest = task.seed, known, active, task.objective, sorted(task.surroundings.items())
     text = repr((task.index, point, structure, ties, *rest))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()

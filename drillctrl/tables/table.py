@@ -16,7 +16,9 @@ from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.designs.drilling import Drilling
 from drillctrl.drilling.structures import as_structure
+from drillctrl.simulation.controller import Controller
 from drillctrl.synthesis.objectives import EXACT, Exact, Objective
 from drillctrl.tables.cells import cell_tasks, check_cells, joined
 from drillctrl.tables.continuation import design_grid
@@ -32,6 +34,7 @@ from drillctrl.tables.node import (
 )
 from drillctrl.tables.refinement import carried_over, refined_grid
 from drillctrl.tables.smoothing import largest_jump, smooth_gains
+from drillctrl.tables.tried_cells import try_cells
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,14 +101,23 @@ class GainTable:
     refusals: Mapping[int, str] = field(default_factory=dict)
 
     @property
+    def on_motion(self) -> bool:
+        """Whether gains were designed on the motion that is drilled with."""
+        return self.objective.startswith(f"{Drilling.__name__}(")
+
+    @property
     def refused(self) -> BoolArray:
         """Nodes whose gains the trials refused, (q,)."""
         return np.isin(np.arange(len(self.gains)), list(self.refusals))
 
     @property
     def sound(self) -> BoolArray:
-        """Nodes that are stable with gains that were not refused, (q,)."""
-        return np.asarray(self.stable & ~self.refused)
+        """Nodes that the table vouches for, (q,).
+
+        They are stable with gains that were not refused; on the motion that is drilled with
+        their gains are recommended, whether smooth drilling is stable or not.
+        """
+        return np.asarray(~self.refused if self.on_motion else self.stable & ~self.refused)
 
     @property
     def entries(self) -> FloatArray:
@@ -221,6 +233,8 @@ class GainTable:
             lost = f"{self.objective} at each node"
         if self.give_up:
             lost = f"smoothest found with at most {100 * self.give_up:g} % of the decay given up"
+        if self.on_motion:
+            lost = "torsional swings on the motion that is drilled with decay soonest"
         lines = [
             f"Gain table, structure {self.structure.name}, {len(self.gains)} nodes",
             f"  {', '.join(axes)}",
@@ -229,13 +243,16 @@ class GainTable:
             f"{int(self.certified.sum())} with the root count agreeing",
         ]
         unstable = int((~self.stable & ~self.refused).sum())
-        if unstable:
+        if self.on_motion:
+            lines.append(f"                {unstable} unstable in smooth drilling, recommended")
+        elif unstable:
             stated = "control off" if self.fallback == "off" else "the best gains found, unstable"
             lines.append(f"                {unstable} that nothing found stabilises: {stated}")
         lines += self._trial_lines()
         if self.sound.any():
             alpha = self.spectral_abscissa[self.sound]
-            lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} where stable")
+            which = "of smooth drilling" if self.on_motion else "where stable"
+            lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} {which}")
         if between is not None:
             ends = self.grid.coordinates[list(between)].T.tolist()
             where = [
@@ -250,7 +267,12 @@ class GainTable:
             f"{int((self.cells.mode == mode).sum())} {name}" for mode, name in enumerate(CELL_NAMES)
         ]
         lines.append(f"  Cells         {', '.join(counts)} (searched, not proved)")
-        if self.worst_abscissa is not None:
+        if self.on_motion:
+            passed = int((self.cells.mode != UNSAFE).sum())
+            lines[-1] = (
+                f"  Cells         {passed} of {self.cells.mode.size} pass trial runs in the middle"
+            )
+        elif self.worst_abscissa is not None:
             worst = f"{self.worst_abscissa:.4g}"
             lines.append(f"                worst α found where vouched for: {worst}")
         return "\n".join(lines)
@@ -261,7 +283,8 @@ class GainTable:
             return ["                gains not tried on the nonlinear motion"]
         if not self.refusals:
             return ["                no gains refused by trial runs on the nonlinear motion"]
-        lines = [f"                {len(self.refusals)} REFUSED by trial runs: control off"]
+        word = "not recommended" if self.on_motion else "REFUSED"
+        lines = [f"                {len(self.refusals)} {word} by trial runs: control off"]
         for node, reason in list(self.refusals.items())[:_SHOWN]:
             place = zip(self.grid.axes, self.grid.coordinates[node].tolist(), strict=True)
             where = ", ".join(a.text(value) for a, value in place if len(a.values) > 1)
@@ -301,6 +324,7 @@ def table(
     fallback: str = "off",
     seed: int = 0,
     trials: bool | None = True,
+    surroundings: Mapping[str, float] | None = None,
     executor: Executor | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
@@ -315,8 +339,10 @@ def table(
         As for `design`.
     bounds : mapping, optional
         As for `design`.
-    objective : Exact, SemiDiscrete, WorstCase or Robust
-        As for `design`. Nodes are stable or not by α whatever is minimised.
+    objective : Exact, Drilling, SemiDiscrete, WorstCase or Robust
+        As for `design`. Nodes are stable or not by α whatever is minimised. With `Drilling` trial
+        runs choose the gains at every node and try them in every cell, and the table vouches
+        for what they recommend.
     give_up : float
         0: the lowest α found at each node. Up to 0.9: the smoothest table found that keeps
         α ≤ (1 − give_up) times the best at every node.
@@ -331,6 +357,8 @@ def table(
     trials : bool, optional
         Whether gains are tried on the nonlinear motion, as by `design`. A node whose gains
         are refused gets no control, whatever the fallback.
+    surroundings : mapping, optional
+        Limits, clock and delays of the controller in these runs, as by `design`.
     executor : concurrent.futures.Executor, optional
         Designs the nodes side by side; without it this process does, one after another. The
         table does not depend on it.
@@ -351,6 +379,11 @@ def table(
     checked_integer("seed", seed, 0, 2**63 - 1)
     if share and not isinstance(objective, Exact):
         raise InputError("give_up", share, f"0 with objective {objective.name}")
+    on_motion = isinstance(objective, Drilling)
+    if on_motion and not trials:
+        raise InputError("trials", False, f"true with objective {objective.name}")
+    around: dict[str, Any] = dict(surroundings or {})
+    Controller(chosen, *chosen.gains(chosen.lower), **around)
     if fallback not in FALLBACKS:
         raise InputError("fallback", fallback, f"one of {', '.join(FALLBACKS)}")
 
@@ -377,23 +410,37 @@ def table(
 
     known: dict[int, NodeDesign] = {}
     for _ in range(rounds + 1):
-        designs = design_grid(grid, chosen, seed, remembered, objective, known)
+        designs = design_grid(grid, chosen, seed, remembered, objective, known, around)
         best = np.array([design.spectral_abscissa for design in designs])
         gains = np.array([design.gains for design in designs]).reshape(len(designs), -1)
         with threadpool_limits(1, user_api="blas"):
             gains = smooth_gains(grid, chosen, gains, best, share)
-        if fallback == "off":
+        if fallback == "off" and not on_motion:
             gains = np.where((best < 0.0)[:, None], gains, no_control(chosen))
         tasks = [
-            NodeTask(i, case, chosen, seed, (gains[i],), trials=bool(trials))
+            NodeTask(
+                i,
+                case,
+                chosen,
+                seed,
+                (gains[i],),
+                trials=bool(trials) and not on_motion,
+                surroundings=around,
+            )
             for i, case in enumerate(grid.cases)
         ]
         checks = sorted(run("check", check_node, tasks), key=lambda check: check.index)
-        refusals = {check.index: check.refusal for check in checks if check.refusal is not None}
+        refusals = {each.index: each.refusal for each in designs if each.refusal}
+        refusals |= {each.index: each.refusal for each in checks if each.refusal}
         gains[list(refusals)] = no_control(chosen)
         stable = np.array([check.stable for check in checks])
-        sound = stable & np.array([check.refusal is None for check in checks])
-        cells = joined(run("cells", check_cells, cell_tasks(grid, chosen, gains, sound)))
+        kept = ~np.isin(np.arange(len(gains)), list(refusals))
+        sound = kept if on_motion else stable & kept
+        if on_motion:
+            parts = run("cells", try_cells, cell_tasks(grid, chosen, gains, sound, around, 1))
+        else:
+            parts = run("cells", check_cells, cell_tasks(grid, chosen, gains, sound))
+        cells = joined(parts)
         result = GainTable(
             grid,
             chosen,
