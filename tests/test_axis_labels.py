@@ -32,7 +32,7 @@ from drillctrl import (
     table1,
     vibration_map,
 )
-from drillctrl.motion.figure import plot_damping
+from drillctrl.motion.figure import plot_damping, plot_response
 from drillctrl.simulation.figure import (
     plot_against_linear,
     plot_phase_portrait,
@@ -195,6 +195,10 @@ def test_of_comparisons_and_bits(where):
     amplitudes = np.array([0.03, 0.3])
     unit = "N·m·s/rad" if where is DRILLING else ""
     check(plot_damping(amplitudes, amplitudes, amplitudes, unit=unit))
+    answer = (amplitudes, amplitudes + 0j)
+    of_rig = where is DRILLING
+    units = ("Hz", "N·m·s/rad") if of_rig else ()
+    check(plot_response(*answer, amplitudes, answer, of_rig, "swing 0.03"), *units)
 
 
 def test_of_strings():

@@ -170,6 +170,9 @@ def map_command(
             checkpoint=checkpoint,
             progress=progress,
         )
+    if beyond := result.unvouched():
+        told = f"the table does not vouch for {beyond} of {len(result.nodes)} points"
+        click.echo(f"drillctrl: note: {told}", err=True)
     if out is not None:
         path = out
         writing("--out", path, lambda: result.save(path))

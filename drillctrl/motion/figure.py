@@ -95,8 +95,9 @@ def plot_response(
         )  # fmt: skip
         ax.plot(model[0], getattr(model[1], part), color=colour, linewidth=1.1)
     ax.set_xscale("log")
-    ax.set_xlabel("frequency, Hz" if with_rig else "frequency ω")
-    ax.set_ylabel("torque of the bit per speed, N·m·s/rad" if with_rig else "H, torque per speed")
+    cycles, unit = ("Hz", "N·m·s/rad") if with_rig else ("", "")
+    ax.set_xlabel(axis_name("frequency" if with_rig else "frequency ω", cycles))
+    ax.set_ylabel(axis_name("H, torque of the bit per speed", unit))
     ax.set_title(f"the bit's answer, {label}; lines: rational model", fontsize="medium")
     ax.legend(fontsize="small")
     return ax

@@ -190,7 +190,7 @@ def _overlay(
     if boundary is not None:
         for curve in boundary:
             ax.plot(curve[:, 0], curve[:, 1], color="black", linewidth=1.3)
-    elif np.nanmin(alpha) < 0.0 < np.nanmax(alpha):
+    elif (alpha < 0.0).any() and (alpha > 0.0).any():
         ax.contour(x, y, alpha.T, levels=[0.0], colors="black", linewidths=1.3)
     if marked is not None:
         ax.plot(*marked, "*", color="white", markeredgecolor="black", markersize=13, clip_on=False)

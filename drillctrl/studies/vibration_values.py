@@ -38,7 +38,7 @@ class Severity:
     weight_ratio : array, (q,)
         Mean weight on bit over that of steady drilling.
     spectral_abscissa : array, (q,)
-        α of the linear loop with an ideal controller.
+        α of the linear loop with an ideal controller; NaN where it could not be told.
     boundary : tuple of array, (k, 2), or None
         Where linear theory has the edge of stable drilling; None where only α is known.
     """
@@ -146,6 +146,15 @@ class MapValues:
         """Return one row a point, in the order of `columns`."""
         return [list(row) for row in zip(*self.columns().values(), strict=True)]
 
+    def unvouched(self) -> int:
+        """Count the points whose gains a table does not vouch for; 0 without a table."""
+        if not isinstance(self.controller, GainTable):
+            return 0
+        names = self.controller.grid.names
+        cases = [self.plane.case_at(*place).parameters for place in self.points.tolist()]
+        groups = [[case[name] for case in cases] for name in names]
+        return int((~self.controller.stable_at(*groups)).sum())
+
     def to_dict(self) -> dict[str, Any]:
         """Return JSON types."""
         axes = {
@@ -164,6 +173,7 @@ class MapValues:
             "marked": None if self.marked is None else list(self.marked),
             "structure": None if self.structure is None else self.structure.name,
             **self._gains(),
+            "unvouched": self.unvouched(),
             "outcomes": {k: None if s is None else s.counts() for k, s in severities.items()},
             "boundaries": {k: _boundary(s) for k, s in severities.items()},
             "rows": [dict(zip(columns, row, strict=True)) for row in self.rows()],

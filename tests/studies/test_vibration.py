@@ -9,7 +9,19 @@ from math import pi
 import numpy as np
 import pytest
 
-from drillctrl import Checkpoint, Controller, InputError, RigPoint, simulate, table1, vibration_map
+from drillctrl import (
+    Checkpoint,
+    Controller,
+    InputError,
+    OperatingPoint,
+    RigPoint,
+    dimensionless_grid,
+    linear_axis,
+    simulate,
+    table,
+    table1,
+    vibration_map,
+)
 from drillctrl.cli import main
 from drillctrl.simulation.scenario import Scenario
 
@@ -89,6 +101,25 @@ def test_a_run_that_was_cut_short_goes_on(found, tmp_path):
         again = vibration_map(POINT, X, Y, **quick, checkpoint=second, progress=tell)
     assert again.rows() == whole.rows()
     assert seen == [("simulate", 1, 2), ("simulate", 2, 2)]
+
+
+def test_gains_of_a_table_are_those_of_each_point():
+    grid = dimensionless_grid(linear_axis("omega0", 8, 12, 2), linear_axis("delta0", 1, 3, 2), 14.0)
+    gains = table(grid, "p", trials=False)
+    quick = {"counts": (2, 2), "refine": 0, "starts": ("small",), "duration": 40.0}
+    axes = ("omega0", 8.0, 12.0), ("delta0", 1.0, 3.0)
+    found = vibration_map(OperatingPoint(10, 2, 14), *axes, gains, **quick)
+    np.testing.assert_allclose(
+        found.controlled.spectral_abscissa, gains.spectral_abscissa, rtol=1e-6, atol=1e-7
+    )
+    corner = Controller("p", gains.gains_at(8.0, 1.0, 14.0)[0][0])
+    one = vibration_map(OperatingPoint(10, 2, 14), *axes, corner, **quick)
+    assert one.controlled.swing[0] == found.controlled.swing[0]
+    assert found.unvouched() == int((~gains.sound).sum())
+    beyond = vibration_map(
+        OperatingPoint(10, 2, 14), ("omega0", 13.0, 14.0), axes[1], gains, **quick
+    )
+    assert beyond.unvouched() == 4
 
 
 def test_files_and_pictures_hold_the_rows(found, tmp_path):
