@@ -107,7 +107,7 @@ class DriveDesign:
         return f"vibration GROWS, {hertz:.3g} Hz fastest, by {rate:.3g} 1/s"
 
     def plot(self) -> Figure:
-        """Draw |r|, impedance, and damping over frequency."""
+        """Draw ``|r|``, impedance, and damping over frequency."""
         return self.found.plot()
 
 

@@ -124,7 +124,9 @@ def judge(
     for trial in runs:
         if (harm := _harm(trial)) is not None:
             return Verdict(False, harm, runs, True)
-    good = next((text for trial in runs if (text := _good(trial)) is not None), None)
+    # The start at which they do most good says what they are for.
+    most = sorted(runs, key=_gained, reverse=True)
+    good = next((text for trial in most if (text := _good(trial)) is not None), None)
     settled = [trial for trial in runs if trial.controlled.outcome == Outcome.SETTLES]
     quiet = all(trial.controlled.outcome in _QUIET for trial in runs)
     if not settled and good is None and quiet and growth is not None and _decays(*growth):
@@ -231,6 +233,14 @@ def _good(trial: Trial) -> str | None:
         shares = _percent(mine.stick_fraction, free.stick_fraction)
         return f"{after} the bit sticks for {shares} of the time"
     return None
+
+
+def _gained(trial: Trial) -> float:
+    """Return by how much the swing is smaller than without control."""
+    mine, free = trial.controlled.swing, None
+    if trial.uncontrolled is not None:
+        free = trial.uncontrolled.swing
+    return 0.0 if mine is None or free is None else free - mine
 
 
 def _more(one: float | None, other: float | None, tolerance: float) -> bool:
