@@ -184,7 +184,9 @@ class DelaySystem:
 
     def rescaled(self) -> DelaySystem:
         """Return `balanced`, to the last factor of 2 even where the norms are small already."""
-        _, (scale, _) = scipy.linalg.matrix_balance(self._size(), permute=False, separate=True)
+        # Scales beyond the integers upset older versions, which look for places among them.
+        with np.errstate(invalid="ignore"):
+            _, (scale, _) = scipy.linalg.matrix_balance(self._size(), permute=False, separate=True)
         ratio = scale[None, :] / scale[:, None]
         return replace(
             self,
