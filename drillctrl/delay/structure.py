@@ -233,3 +233,8 @@ class FeedbackStructure:
             K2_lower=arrays[0][half:].reshape(shape),
             K2_upper=arrays[1][half:].reshape(shape),
         )
+
+
+def no_control(structure: FeedbackStructure) -> FloatArray:
+    """Return the gain vector that is nearest to no control within the bounds, (k,)."""
+    return np.asarray(np.clip(0.0, structure.lower, structure.upper))

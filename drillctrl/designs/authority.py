@@ -71,6 +71,11 @@ class Candidate:
         return all(each.in_band for each in self.swings)
 
     @property
+    def spoils(self) -> bool:
+        """Whether a mode grows that was left alone without control."""
+        return any(each.spoils for each in self.swings)
+
+    @property
     def trials(self) -> tuple[Trial, ...]:
         """The runs, if there were any."""
         return () if self.verdict is None else self.verdict.trials
@@ -102,7 +107,7 @@ def candidates(
     """Return the gains of slowest decay made fastest within falling shares of the bounds.
 
     Left out are gains that take a mode out of the band of frequencies for which the bit's
-    answer was measured, except where all do.
+    answer was measured, or make another grow, except where all do.
     """
     frequency = torsional_modes(case)[0].root.imag
     found: list[Candidate] = []
@@ -116,10 +121,10 @@ def candidates(
         if found and (np.abs(gains - found[-1].solution.gains) < _SAME * width).all():
             continue
         growth = max(family.exact(gains) for family in families)
-        met = problem.meets(families[0], gains, requirements)
+        met = all(problem.meets(family, gains, requirements) for family in families)
         made = controlled_swings(case, objective, swings, structure, gains)
         found.append(Candidate(share, solution, growth, met, made))
-    return [each for each in found if each.in_band] or found[-1:]
+    return [each for each in found if each.in_band and not each.spoils] or found[-1:]
 
 
 def _scaled(structure: FeedbackStructure, share: float) -> FeedbackStructure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.base.text import finite_or_none
 from drillctrl.base.workers import spread_out
-from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.structure import FeedbackStructure, no_control
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.worst_case import box
 from drillctrl.drilling.case import Case
@@ -22,7 +22,7 @@ from drillctrl.motion.loop import torsional_system
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, bit_response
 from drillctrl.motion.swing import mode_at
 from drillctrl.motion.torsion import TorsionalMode, torsional_modes
-from drillctrl.spectrum.roots import dominant_roots, spectral_abscissa
+from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.synthesis.descent import Objective
 from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import WorstLoop
@@ -33,6 +33,8 @@ _AMPLITUDES = (0.03, 0.1, 0.2, 0.3)
 _UNKNOWN = 0.25
 # Where H of one frequency stands for that of another, over it.
 _BAND = (0.5, 2.0)
+# Modes that a root of the loop may belong to; growth above that is no rounding.
+_MODES, _GROWS = 20, 1e-6
 # Share of the frequency by which a root moves before H is measured anew there.
 _MOVED = 0.1
 # Cost of gains on their bounds, over the largest of these.
@@ -138,20 +140,29 @@ class ControlledSwing:
     swing : Swing
         Without control, with H at the frequency of the controlled mode where it moved.
     growth : float
-        Rate with control, the largest for all H within their error.
+        Rate with control, the largest of any torsional mode for all H within their error.
     frequency : float
         Of that motion.
+    mode : int
+        Which mode it is by its frequency, that of the swing or another.
+    natural : float
+        Frequency of that mode without control.
+    spoils : bool
+        Whether it is another mode, which grows, and faster than any does without control.
     """
 
     swing: Swing
     growth: float
     frequency: float
+    mode: int
+    natural: float
+    spoils: bool
 
     @property
     def in_band(self) -> bool:
-        """Whether the motion is near enough to the frequency at which H was measured."""
+        """Whether the motion is near enough to the frequency of its mode, about which H holds."""
         low, high = _BAND
-        return low * self.swing.frequency <= self.frequency <= high * self.swing.frequency
+        return low * self.natural <= self.frequency <= high * self.natural
 
 
 @dataclass(frozen=True)
@@ -193,6 +204,7 @@ class OnMotion:
                     **_swing_fields(each.swing),
                     "controlled_growth_rate": each.growth,
                     "controlled_frequency": each.frequency,
+                    "controlled_mode": each.mode,
                     "in_band": each.in_band,
                 }
                 for each in self.swings
@@ -331,18 +343,41 @@ def controlled_swings(
 ) -> tuple[ControlledSwing, ...]:
     """Return what gains make of every swing whose answer is known."""
     cases = cases_around(case, objective)
+    own = [{m.number: m.root.imag for m in torsional_modes(there, _MODES)} for there in cases]
+    off = no_control(structure)
     found = []
     for swing in swings:
         if not swing.known:
             continue
-        loops = [
-            loop_family(system, structure).loop(gains)
+        families = [
+            loop_family(system, structure)
             for system in swing_systems(cases[swing.point], swing, structure.inputs)
         ]
-        worst = max(loops, key=spectral_abscissa)
-        root = dominant_roots(worst)[0]
-        found.append(ControlledSwing(swing, root.real, abs(root.imag)))
+        natural = own[swing.point] | {swing.mode: swing.frequency}
+        made = [_controlled(family, gains, off, swing, natural) for family in families]
+        found.append(max(made, key=lambda each: each.growth))
     return tuple(found)
+
+
+def _controlled(
+    family: LoopFamily,
+    gains: FloatArray,
+    off: FloatArray,
+    swing: Swing,
+    natural: Mapping[int, float],
+) -> ControlledSwing:
+    """Return the slowest vibration of a loop, and whether it is worse than without control."""
+    free, roots = dominant_roots(family.loop(off)), dominant_roots(family.loop(gains))
+    slowest = _BAND[0] * min(natural.values())
+    grows = max(0.0, free[0].real) + _GROWS
+    # A string that is held by its drive alone turns as a whole: no vibration unless it grows.
+    whole = any(abs(root.imag) < slowest for root in free)
+    counted = [r for r in roots if not whole or abs(r.imag) >= slowest or r.real > grows]
+    root = (counted or roots)[0]
+    frequency = abs(root.imag)
+    mode = min(natural, key=lambda m: abs(np.log(max(frequency, 1e-300) / natural[m])))
+    spoils = mode != swing.mode and root.real > grows
+    return ControlledSwing(swing, root.real, frequency, mode, natural[mode], spoils)
 
 
 def followed_swings(
@@ -358,7 +393,8 @@ def followed_swings(
     moved = []
     for each in controlled_swings(case, objective, swings, structure, gains):
         swing = each.swing
-        if each.in_band and abs(each.frequency - swing.frequency) > _MOVED * swing.frequency:
+        own = each.in_band and each.mode == swing.mode
+        if own and abs(each.frequency - swing.frequency) > _MOVED * swing.frequency:
             found = bit_response(
                 cases[swing.point], each.frequency, swing.amplitude,
                 ripple=True, most_periods=FEWEST_PERIODS, **options,

@@ -229,12 +229,15 @@ def _motion_lines(design: DesignValues) -> Lines:
         if swing.growth_error > _SHOWN * abs(swing.growth):
             text += f" ± {swing.growth_error / unit:.1g}"
         text += f" → {each.growth / unit:.3g}"
+        if each.mode != swing.mode:
+            text += f" of mode {each.mode}"
         lines.append(("", text + ("" if each.in_band else " (outside the band of H)")))
     if found.unknown:
         swings = ", ".join(dict.fromkeys(f"{swing.amplitude:.2f}" for swing in found.unknown))
         lines.append(("", f"too irregular to tell at swing {swings}: there runs alone decide"))
     share = f"1/{1.0 / found.share:.0f} of the bounds" if found.share < 1.0 else "all of the bounds"
-    lines.append(("", f"within {share}, as trial runs chose"))
+    why = "as trial runs chose" if design.trials else "the most that keeps modes near H"
+    lines.append(("", f"within {share}, {why}"))
     return lines
 
 

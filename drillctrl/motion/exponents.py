@@ -10,12 +10,12 @@ from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.floquet import floquet
+from drillctrl.simulation.floquet import check_continuous, floquet
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.status import Status
 
 _REACHED, _LONGEST = 20.0, 1000.0
-# Multipliers nearer to 1 than this are the shift along the orbit.
+# The multiplier of the shift along the orbit is no further from 1.
 _SHIFT = 1e-4
 
 
@@ -46,8 +46,9 @@ def orbit_exponents(
     Raises
     ------
     InputError
-        If there is no plant.
+        If there is no plant, or the controller is sampled, noisy or scheduled.
     """
+    check_continuous(controller)
     case = as_case(where)
     _, point = case.physics("an orbit")
     duration = min(_REACHED / max(point.kappa, 1e-9), _LONGEST)
@@ -60,5 +61,8 @@ def orbit_exponents(
     except InputError:
         # It does not repeat.
         return None
-    kept = found.multipliers[np.abs(found.multipliers - 1.0) > _SHIFT]
+    away = np.abs(found.multipliers - 1.0)
+    shift = int(away.argmin())
+    # A mode that neither grows nor decays has a multiplier of 1 as well.
+    kept = np.delete(found.multipliers, shift) if away[shift] < _SHIFT else found.multipliers
     return np.asarray(np.log(kept.astype(complex)) / found.period)

@@ -91,7 +91,7 @@ def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: 
     """
     checked_integer("directions", directions, 2, 200)
     checked_number("size", size, 1e-7, 1e-2)
-    _check_controller(run.controller)
+    check_continuous(run.controller)
     if run.scenario.changes and run.scenario.changes[-1].time > 0.5 * run.times[-1]:
         raise InputError("run", "changed on the way", "one that has come to an orbit since")
     orbit = limit_cycle(run, since=0.5 * float(run.times[-1]))
@@ -164,8 +164,14 @@ def multipliers_at(
     return _arnoldi(image, first, directions, _ERROR * _RTOL / size)
 
 
-def _check_controller(controller: Controller | None) -> None:
-    """Refuse a controller under which no motion repeats."""
+def check_continuous(controller: Controller | None) -> None:
+    """Refuse a controller under which no motion repeats.
+
+    Raises
+    ------
+    InputError
+        If it is sampled, noisy or scheduled.
+    """
     if controller is None:
         return
     if controller.period is not None or controller.schedule or controller.noise:

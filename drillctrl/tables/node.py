@@ -11,7 +11,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
-from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.structure import FeedbackStructure, no_control
 from drillctrl.designs.design import design
 from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.loop_analysis import analyze_loop
@@ -220,11 +220,6 @@ def check_node(task: NodeTask) -> NodeCheck:
         loop.certificate.agrees,
         refusal,
     )
-
-
-def no_control(structure: FeedbackStructure) -> FloatArray:
-    """Return the gain vector that is nearest to no control within the bounds, (k,)."""
-    return np.asarray(np.clip(0.0, structure.lower, structure.upper))
 
 
 def find_design(checkpoint: Checkpoint, task: NodeTask) -> NodeDesign | None:

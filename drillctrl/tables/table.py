@@ -15,7 +15,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.workers import Progress, spread_out
-from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.delay.structure import FeedbackStructure, no_control
 from drillctrl.designs.drilling import Drilling
 from drillctrl.drilling.structures import as_structure
 from drillctrl.simulation.controller import Controller
@@ -30,7 +30,6 @@ from drillctrl.tables.node import (
     check_node,
     find_design,
     keep_design,
-    no_control,
 )
 from drillctrl.tables.refinement import carried_over, refined_grid
 from drillctrl.tables.smoothing import largest_jump, smooth_gains

@@ -22,6 +22,7 @@ from drillctrl import (
     preset_structure,
     simulate,
     spectral_abscissa,
+    string_preset,
     table1,
     torsional_system,
 )
@@ -36,6 +37,7 @@ from drillctrl.designs.drilling import (
 from drillctrl.designs.quieter import quieter
 from drillctrl.designs.trials import STARTS, Trial, trial_run
 from drillctrl.designs.verdict import Verdict, judge
+from drillctrl.motion.torsion import torsional_modes
 from drillctrl.simulation.outcome import Figures
 from drillctrl.simulation.status import Outcome
 
@@ -84,6 +86,23 @@ def test_the_torsional_loop_of_one_degree_of_freedom(value, frequency, spring, d
     assert made.growth == pytest.approx(roots.real.max(), abs=1e-8)
     free = np.roots([1.0, damping, stiffness])
     assert spectral_abscissa(system) == pytest.approx(free.real.max(), abs=1e-8)
+
+
+def test_modes_of_a_string_that_gains_leave_alone_and_one_that_they_make_grow():
+    case = as_case(RigPoint(string_preset("vertical-3000"), 5.0, 0.005))
+    (first,) = torsional_modes(case)
+    structure = preset_structure("case2")
+    swing = Swing(0, 1, 0.1, first.root.imag, 0j, 0.0, 0.0, 0.0)
+    gains = [np.array([0.0, 0.0, 0.0, late]) for late in (0.0, -5.0)]
+    free, made = (controlled_swings(case, QUICK, [swing], structure, k)[0] for k in gains)
+    # The whole string turns freely, which is no vibration.
+    assert complex(free.growth, free.frequency) == pytest.approx(first.root, abs=1e-3)
+    assert free.in_band
+    assert not free.spoils
+    # So late a damper feeds the fast modes.
+    assert made.growth > 1.0
+    assert made.mode > 10
+    assert made.spoils
 
 
 def test_gains_that_move_the_frequency_cost():
@@ -268,7 +287,7 @@ def test_swings_that_decay_sooner_are_a_good_of_quiet_motions_only():
 def test_candidates_that_runs_tell_apart():
     def candidate(*swings):
         trials = tuple(Trial(STARTS[0], figures(swing), figures(0.5)) for swing in swings)
-        return Candidate(1.0, None, -0.1, True, (), Verdict(True, "", trials))
+        return Candidate(1.0, None, -0.1, True, (), verdict=Verdict(True, "", trials))
 
     assert irregular([candidate(0.25, 0.6)])
     assert irregular([candidate(0.5), candidate(0.25)])
