@@ -96,6 +96,9 @@ from .motion.swing import ModeAt as ModeAt
 from .motion.swing import ModeSwing as ModeSwing
 from .motion.swing import drilling_motion as drilling_motion
 from .motion.swing import mode_at as mode_at
+from .motion.threshold import ModeAlong as ModeAlong
+from .motion.threshold import Threshold as Threshold
+from .motion.threshold import torsional_threshold as torsional_threshold
 from .motion.torsion import TorsionalMode as TorsionalMode
 from .motion.torsion import torsional_modes as torsional_modes
 from .paper.agreement import Agreement as Agreement

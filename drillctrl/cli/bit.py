@@ -20,7 +20,13 @@ from drillctrl.cli.verb import Verb
     metavar="A,…",
     help="Swings of the bit's speed, shares of it, rising in (0, 1); 0.01 to 0.95 without it.",
 )
-@click.option("--modes", type=int, default=1, show_default=True, help="Torsional modes.")
+@click.option(
+    "--modes",
+    type=int,
+    default=1,
+    show_default=True,
+    help="Torsional modes; the last with --along.",
+)
 @click.option(
     "--most-periods",
     type=int,
@@ -34,6 +40,11 @@ from drillctrl.cli.verb import Verb
     help="Impose the rotation whole: no ripple beside the swing.",
 )
 @click.option("--band", is_flag=True, help="Over frequency instead, at the first amplitude (0.1).")
+@click.option(
+    "--along",
+    type=click.Choice(["speed", "rate"]),
+    help="Over rotary speed or rate of penetration instead, half to twice the point's.",
+)
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json.")
@@ -44,6 +55,7 @@ def bit_command(
     most_periods: int,
     imposed: bool,
     band: bool,
+    along: str | None,
     workers: int,
     as_json: bool,
     out: str | None,
@@ -61,11 +73,17 @@ def bit_command(
       drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --amplitudes 0.03,0.3
       drillctrl bit --rig table1 --speed "120 rpm" --rop "50 m/h" --plot bit.png
       drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --band --plot band.png
+      drillctrl bit --rig table1 --speed "150 rpm" --rop "50 m/h" --along speed
     """
     check_json(out)
     check_figure(plot)
     wanted = _read(amplitudes)
     where = read_point(point)
+    if band and along is not None:
+        raise InputError("--along", along, "left out with --band")
+    if along is not None:
+        _along(where, along, wanted, modes, workers, rig_name(point), as_json, out, plot)
+        return
     if band:
         _band(where, wanted, workers, most_periods, imposed, as_json, out, plot)
         return
@@ -106,6 +124,29 @@ def _band(
     fields = {"schema": "drillctrl/bit-band/1", **band_fields(found)}
     text = functools.partial(band_summary, found)
     deliver(fields, text, found.plot, as_json=as_json, out=out, plot=plot)
+
+
+def _along(
+    where: Any,
+    along: str,
+    amplitudes: list[float] | None,
+    mode: int,
+    workers: int,
+    name: str | None,
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+) -> None:
+    """Tell the damping left over speed or rate."""
+    from drillctrl.motion.report import along_fields, along_summary
+    from drillctrl.motion.threshold import torsional_threshold
+
+    amplitude = 0.03 if not amplitudes else amplitudes[0]
+    found = torsional_threshold(where, along, amplitude=amplitude, mode=mode, workers=workers)
+    fields = {"schema": "drillctrl/bit-along/1", **along_fields(found)}
+    text = functools.partial(along_summary, found)
+    draw = functools.partial(found.plot, name=name)
+    deliver(fields, text, draw, as_json=as_json, out=out, plot=plot)
 
 
 def _read(amplitudes: str | None) -> list[float] | None:

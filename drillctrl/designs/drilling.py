@@ -399,7 +399,7 @@ def followed_swings(
                 cases[swing.point], each.frequency, swing.amplitude,
                 ripple=True, most_periods=FEWEST_PERIODS, **options,
             )  # fmt: skip
-            if found.broken is None:
+            if np.isfinite(found.error):
                 swing = Swing(
                     swing.point, swing.mode, found.amplitude, each.frequency, found.value,
                     found.error, swing.growth, swing.growth_error,

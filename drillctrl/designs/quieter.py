@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from drillctrl.designs.trials import STARTS, trial_run
 from drillctrl.designs.verdict import FAILURES
 from drillctrl.drilling.case import Case
-from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.drilling.point import OperatingPoint, RigPoint, changed_by
 
 # Largest swing of a motion that is called quiet.
 QUIET = 0.3
@@ -81,26 +81,14 @@ def _largest_swing(case: Case) -> float | None:
 _Changes = Iterator[tuple[float, OperatingPoint | RigPoint]]
 
 
-def _changed(
-    where: OperatingPoint | RigPoint, speed: float, rate: float
-) -> OperatingPoint | RigPoint:
-    if isinstance(where, RigPoint):
-        return replace(
-            where,
-            rotary_speed=where.rotary_speed * speed,
-            penetration_rate=where.penetration_rate * rate,
-        )
-    return where.with_changes(omega0=where.omega0 * speed, delta0=where.delta0 * rate / speed)
-
-
 def _faster(where: OperatingPoint | RigPoint) -> _Changes:
     for factor in _FASTER:
-        yield factor, _changed(where, factor, 1.0)
+        yield factor, changed_by(where, speed=factor)
 
 
 def _less(where: OperatingPoint | RigPoint) -> _Changes:
     for factor in _LESS:
-        yield factor, _changed(where, 1.0, factor)
+        yield factor, changed_by(where, rate=factor)
 
 
 def _blades(where: OperatingPoint | RigPoint) -> _Changes:

@@ -196,3 +196,19 @@ def _quotient(
     if numerator > 0.0:
         raise InputError(name, group, "0, since the reference rig has no such friction")
     return otherwise
+
+
+def changed_by(
+    where: OperatingPoint | RigPoint, *, speed: float = 1.0, rate: float = 1.0
+) -> OperatingPoint | RigPoint:
+    """Return a point with its rotary speed and its rate of penetration times these factors.
+
+    Faster rotation at the same rate cuts less deep.
+    """
+    if isinstance(where, RigPoint):
+        return replace(
+            where,
+            rotary_speed=where.rotary_speed * speed,
+            penetration_rate=where.penetration_rate * rate,
+        )
+    return where.with_changes(omega0=where.omega0 * speed, delta0=where.delta0 * rate / speed)

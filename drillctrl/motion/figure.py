@@ -61,6 +61,65 @@ def plot_damping(
     return ax
 
 
+def plot_damping_along(
+    values: FloatArray,
+    damping: FloatArray,
+    errors: FloatArray,
+    thresholds: Sequence[tuple[str, float]],
+    *,
+    along: str,
+    with_rig: bool,
+    label: str,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the damping left to a mode over rotary speed or rate of penetration.
+
+    Parameters
+    ----------
+    values, damping, errors : array, (k,)
+        Speeds or rates; damping left; and its error, infinite where it is not known.
+    thresholds : sequence of (side, value)
+        Where the mode neither grows nor decays, and on which side it decays.
+    along : {"speed", "rate"}
+        What the values are.
+    with_rig : bool
+        Whether they are in rpm or m/h, and the damping in SI.
+    label, title : str
+        Name of the mode; where that is.
+    ax : Axes, optional
+        By default new ones.
+    """
+    ax = new_axes(6.4, 4.2) if ax is None else ax
+    known = np.isfinite(damping) & np.isfinite(errors)
+    name, unit = {
+        "speed": ("rotary speed", "rpm") if with_rig else ("rotary speed ω0", ""),
+        "rate": ("rate of penetration", "m/h") if with_rig else ("rate of penetration", ""),
+    }[along]
+    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    ax.errorbar(
+        values[known], damping[known], errors[known],
+        color=BLUE, marker="o", markersize=3, linewidth=1.1, capsize=2, label=label,
+    )  # fmt: skip
+    for side, value in thresholds:
+        told = f"decays {side} {value:.3g} {unit}".rstrip()
+        ax.axvline(value, color=ORANGE, linestyle="-" if side == "above" else "--", label=told)
+    for i, value in enumerate(values[~known]):
+        told = "not known, the bit swings of itself" if i == 0 else None
+        ax.axvline(value, color=GREY, linewidth=0.8, linestyle=":", label=told)
+    # An error that dwarfs all else hides where the mode decays.
+    shown = damping[known][errors[known] < max(float(np.ptp(damping[known])), 1e-300)]
+    if shown.size > 1:
+        room = 0.15 * max(float(np.ptp(shown)), float(np.abs(shown).max()))
+        ax.set_ylim(min(float(shown.min()), 0.0) - room, max(float(shown.max()), 0.0) + room)
+    ax.set_xlabel(axis_name(name, unit))
+    ax.set_ylabel(axis_name("damping left to the mode", "N·m·s/rad" if with_rig else ""))
+    if title:
+        ax.set_title(title, fontsize="medium")
+    ax.legend(fontsize="small")
+    return ax
+
+
 def plot_response(
     frequencies: FloatArray,
     values: ComplexArray,

@@ -31,6 +31,8 @@ _PERIODS, _PER_RUN, _PER_LONG_RUN, _LONG = 4, 10, 2, 20
 _SETTLING = 10.0
 _SHORTEST, _LONGEST = 60.0, 500.0
 _SURE = 2.0
+# Swing of the speed beside the one that is imposed, beyond which that is not what the bit does.
+_OWN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,8 @@ class BitResponse:
         NaN where a run broke off. At −ω it is the conjugate.
     error : float
         Of the modulus of H: twice the standard error of the mean over windows, or half the
-        difference of the two starts where that is more; infinite where a run broke off.
+        difference of the two starts where that is more; infinite where a run broke off, or the
+        bit swings of itself by half of its speed.
     windows : complex array, (w,)
         H in each window, those of one start after those of the other.
     starts : complex array, (2,)
@@ -60,7 +63,9 @@ class BitResponse:
     periods : int
         Of ω, that were looked at.
     ripple : bool
-        Whether the speed rippled beside the swing.
+        Whether the speed could ripple beside the swing.
+    rippled : float
+        By how much it did: (max − min)/(2 Ω0), less A.
     broken : Status, Outcome or None
         Why a run broke off: its status, or that the bit bounces without bound, for which an
         imposed rotation has power enough.
@@ -78,6 +83,7 @@ class BitResponse:
     lifted: float
     periods: int
     ripple: bool = False
+    rippled: float = 0.0
     broken: Status | Outcome | None = None
 
     @property
@@ -171,7 +177,12 @@ def bit_response(
             start.go_on()
         found = _response(starts, frequency, amplitude, ripple)
         periods = found.periods // len(starts)
-        if found.broken or found.error <= tolerance or periods >= most_periods:
+        if (
+            found.broken
+            or found.rippled > _OWN
+            or found.error <= tolerance
+            or periods >= most_periods
+        ):
             return found
 
 
@@ -199,6 +210,7 @@ class _Start:
             initial["dlead"] = self.speed
         self.scenario = Scenario(initial=initial)
         self.found: list[Halves] = []
+        self.swing = 0.0
         self.broken: Status | Outcome | None = None
 
     def go_on(self) -> None:
@@ -221,22 +233,14 @@ class _Start:
             self.broken = Outcome.DIVERGES
         else:
             self.scenario = Scenario(start=run.past())
+            speed = run.at(run.times, ("dtheta",)).dtheta
+            self.swing = float(np.ptp(speed)) / 2.0
         return run
 
     @property
     def every(self) -> Halves:
         """All halves of windows."""
         return Halves(*[np.concatenate(parts) for parts in zip(*self.found, strict=True)])
-
-    @property
-    def speeds(self) -> ComplexArray:
-        """Amplitude of the speed in each window; each run begins at phase 0."""
-        return windowed(self.every.speeds)
-
-    @property
-    def windows(self) -> ComplexArray:
-        """H in each window."""
-        return windowed(self.every.torques) / self.speeds
 
 
 def _response(
@@ -248,25 +252,36 @@ def _response(
         return BitResponse(
             frequency, amplitude, complex(math.nan, math.nan), math.inf,
             np.zeros(0, dtype=complex), np.full(len(starts), np.nan + 0j),
-            math.nan, math.nan, math.nan, math.nan, 0, ripple, broken[0],
+            math.nan, math.nan, math.nan, math.nan, 0, ripple, math.nan, broken[0],
         )  # fmt: skip
-    by_start = [start.windows for start in starts]
-    windows = np.concatenate(by_start)
-    means = np.array([each.mean() for each in by_start])
-    value = complex(means.mean())
+    torques = [windowed(start.every.torques) for start in starts]
+    speeds = [windowed(start.every.speeds) for start in starts]
+    # The imposed swing has the same phase in every window, and noise has none: the ratio of the
+    # means is H even where the torque of an irregular orbit moves the speed as much.
+    means = np.array([t.mean() / v.mean() for t, v in zip(torques, speeds, strict=True)])
+    torque_part, speed_part = np.concatenate(torques), np.concatenate(speeds)
+    count, speed_mean = speed_part.size, speed_part.mean()
+    value = complex(torque_part.mean() / speed_mean)
+    windows = value + (torque_part - value * speed_part) / speed_mean
     # Windows that overlap by half are as good as independent.
-    within = np.concatenate([each - mean for each, mean in zip(by_start, means, strict=True)])
-    freedom = max(windows.size - len(starts), 1)
-    deviation = math.sqrt(float((np.abs(within) ** 2).sum()) / freedom)
-    error = max(_SURE * deviation / math.sqrt(windows.size), float(np.abs(means - value).max()))
+    ends = np.cumsum([t.size for t in torques])[:-1]
+    within = np.concatenate([part - part.mean() for part in np.split(windows, ends)])
+    freedom = max(count - len(starts), 1)
+    spread = float(np.std(speed_part)) / (math.sqrt(count) * abs(speed_mean))
+    # A mean speed that is hardly known is no divisor.
+    known = max(1.0 - _SURE * spread, 0.0)
+    error = _SURE * math.sqrt(float((np.abs(within) ** 2).sum()) / freedom / count)
+    error = max(error, float(np.abs(means - value).max())) / known if known else math.inf
     every = [start.every for start in starts]
     weight, torque, held, lifted = (
         float(np.concatenate([getattr(each, name) for each in every]).mean())
         for name in ("weight", "torque", "held", "lifted")
     )
     _, point = starts[0].case.physics("the response of a bit")
-    swings = np.concatenate([np.abs(start.speeds) for start in starts])
-    amplitude = float(swings.mean()) / point.omega0
+    amplitude = float(abs(speed_mean)) / point.omega0
+    rippled = max(0.0, max(start.swing for start in starts) / point.omega0 - amplitude)
+    if rippled > _OWN:
+        error = math.inf
     periods = _PERIODS * sum(each.weight.size for each in every)
     return BitResponse(
         frequency,
@@ -281,4 +296,5 @@ def _response(
         lifted,
         periods,
         ripple,
+        rippled,
     )

@@ -255,7 +255,7 @@ def mode_at(
     found = _followed(where, mode, amplitude, {**options, "ripple": ripple})
     if ripple and found.broken is not None:
         found = _followed(where, mode, amplitude, options)
-    if found.broken is not None:
+    if not math.isfinite(found.error):
         return ModeAt(found, complex(math.nan, math.nan), math.inf)
     root = mode.with_response(found.value)
     around = [mode.with_response(found.value + found.error * d) for d in _DIRECTIONS]
@@ -271,7 +271,7 @@ def _followed(
     quick = {**options, "most_periods": FEWEST_PERIODS}
     for _ in range(_FOLLOWED):
         response = bit_response(where, frequency, amplitude, **quick)
-        if response.broken is not None:
+        if not math.isfinite(response.error):
             return response
         root = mode.with_response(response.value)
         shift = abs(root.imag - frequency)

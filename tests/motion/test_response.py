@@ -25,8 +25,10 @@ from drillctrl import (
     table1,
     top_drive_plant,
     torsional_modes,
+    torsional_threshold,
 )
 from drillctrl.drilling.case import as_case
+from drillctrl.motion.report import along_fields, along_summary
 from drillctrl.motion.torsion import forced_speed, ripple_of
 from drillctrl.simulation.status import Outcome
 from tests.motion.fixed_step import fixed_step_response
@@ -276,3 +278,47 @@ def test_command_line(capsys, tmp_path):
         status, said = run("--amplitudes", wrong)
         assert status == 2
         assert name in said.err
+
+
+def test_answers_of_a_slow_swing_are_those_of_the_averaged_law():
+    """What the mean torque on the axial orbit loses by speed is H at low frequency alone."""
+    slower, faster = (axial_orbit(rig_point(100 * f, 10)) for f in (0.97, 1.03))
+    speeds = [rig_point(100 * f, 10).operating_point().omega0 for f in (0.97, 1.03)]
+    slope = (faster.torque - slower.torque) / (speeds[1] - speeds[0])
+    quick, slow = (bit_response(rig_point(100, 10), w, 0.03, most_periods=40) for w in (1.0, 0.1))
+    # The answer relaxes from the averaged to the quick one with one time constant.
+    part = slow.value - quick.value.real
+    lag = -part.imag / part.real
+    assert (quick.value.real + part.real * (1.0 + lag**2)) * UNIT == pytest.approx(
+        slope * UNIT, rel=0.02
+    )
+    assert slope * UNIT < -45.0
+    assert quick.value.real * UNIT > -13.0
+
+
+def test_a_bit_that_swings_of_itself_has_no_answer():
+    bouncing = bit_response(rig_point(60, 20), 1.0, 0.03, ripple=True, most_periods=40)
+    assert bouncing.rippled > 0.5
+    assert bouncing.error == math.inf
+    (mode,) = torsional_modes(rig_point(60, 20))
+    assert mode_at(rig_point(60, 20), mode, 0.03, most_periods=40).sign == 0
+    quiet = bit_response(rig_point(120, 20), 1.0, 0.03, ripple=True, most_periods=40)
+    assert quiet.rippled < 0.03
+
+
+def test_speeds_between_which_swings_decay(monkeypatch):
+    monkeypatch.setattr("drillctrl.motion.threshold._POINTS", 4)
+    monkeypatch.setattr("drillctrl.motion.threshold._HALVED", 2)
+    found = torsional_threshold(rig_point(130, 50), "speed", least=0.93, most=1.1)
+    told = [(t.decays, t.factor * found.own_value) for t in found.thresholds]
+    assert [side for side, _ in told] == ["below", "above"]
+    assert [value for _, value in told] == pytest.approx([123.4, 139.8], rel=0.01)
+    fields = along_fields(found)
+    assert fields["unit"] == "rpm"
+    assert "Decays above" in along_summary(found)
+    for rpm, grows in ((121.5, False), (131.0, True), (142.0, False)):
+        point = rig_point(rpm, 50)
+        speed = 0.04 * point.operating_point().omega0
+        run = simulate(point, duration=81.0, initial={"dx": 0.1, "dtheta": speed})
+        _, swings = swing_of(run, 10.0, 80.0)
+        assert (swings[-1] > swings[0]) == grows
