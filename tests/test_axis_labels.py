@@ -32,7 +32,7 @@ from drillctrl import (
     table1,
     vibration_map,
 )
-from drillctrl.motion.figure import plot_damping, plot_response
+from drillctrl.motion.figure import plot_damping, plot_damping_along, plot_response
 from drillctrl.simulation.figure import (
     plot_against_linear,
     plot_phase_portrait,
@@ -198,6 +198,12 @@ def test_of_comparisons_and_bits(where):
     answer = (amplitudes, amplitudes + 0j)
     of_rig = where is DRILLING
     units = ("Hz", "N·m·s/rad") if of_rig else ()
+    for along, named in (("speed", "rpm"), ("rate", "m/h")):
+        drawn = plot_damping_along(
+            *(100.0 * amplitudes, amplitudes, amplitudes, [("above", 20.0)]),
+            along=along, with_rig=of_rig, label="mode 1",
+        )  # fmt: skip
+        check(drawn, *((named, "N·m·s/rad") if of_rig else ()))
     check(plot_response(*answer, amplitudes, answer, of_rig, "swing 0.03"), *units)
 
 

@@ -105,8 +105,8 @@ def plot_damping_along(
         told = f"decays {side} {value:.3g} {unit}".rstrip()
         ax.axvline(value, color=ORANGE, linestyle="-" if side == "above" else "--", label=told)
     for i, value in enumerate(values[~known]):
-        told = "not known, the bit swings of itself" if i == 0 else None
-        ax.axvline(value, color=GREY, linewidth=0.8, linestyle=":", label=told)
+        once = "" if i else "not known, the bit swings of itself"
+        ax.axvline(value, color=GREY, linewidth=0.8, linestyle=":", label=once)
     # An error that dwarfs all else hides where the mode decays.
     shown = damping[known][errors[known] < max(float(np.ptp(damping[known])), 1e-300)]
     if shown.size > 1:
