@@ -36,6 +36,12 @@ if TYPE_CHECKING:
     help="Rock face: multiple (deepest of all passes) or single (the last pass).",
 )
 @click.option(
+    "--backwards",
+    default="rest",
+    show_default=True,
+    help="A bit that turns back: rest (its cutters rest on the rock) or stop (the run ends).",
+)
+@click.option(
     "--duration",
     metavar="TIME",
     default="200",
@@ -84,6 +90,7 @@ if TYPE_CHECKING:
 def simulate_command(
     model: str,
     cutting: str,
+    backwards: str,
     duration: str,
     start: str,
     starts: str | None,
@@ -138,7 +145,12 @@ def simulate_command(
                 raise InputError(option, "given", "left out where there is --starts")
     scenario = read_scenario(start, initial, change, groups, rig)
     controller = read_controller(options, where, groups, scenario, length, rig)
-    common: dict[str, Any] = {"duration": length, "cutting": cutting, "rtol": rtol}
+    common: dict[str, Any] = {
+        "duration": length,
+        "cutting": cutting,
+        "backwards": backwards,
+        "rtol": rtol,
+    }
     check = {**common, "scenario": scenario, "controller": controller}
     checked_run(groups, **check, model=model)
     if figure in ("linear", "face") and model == "linear":

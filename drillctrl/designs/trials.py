@@ -100,6 +100,7 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
         scenario=start.scenario(point),
         rtol=rtol,
         max_steps=_STEPS,
+        backwards="stop",
     )
 
 

@@ -53,6 +53,7 @@ def orbit_exponents(
     _, point = case.physics("an orbit")
     duration = min(_REACHED / max(point.kappa, 1e-9), _LONGEST)
     initial = {"dx": 0.05 * point.penetration_rate}
+    options = {"backwards": "stop", **options}
     run = simulate(case, controller, duration=duration, initial=initial, **options)
     if run.status != Status.DONE:
         return None

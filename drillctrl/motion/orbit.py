@@ -90,6 +90,7 @@ def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOr
     _, point = case.physics("an axial orbit")
     wait = settling_time(case)
     initial = {"dx": kick * point.penetration_rate}
+    options = {"backwards": "stop", **options}
     run = simulate(case, duration=wait + _LOOKED_AT, initial=initial, **options)
     broken: Status | Outcome | None = None if run.status == Status.DONE else run.status
     if broken is None and grows_without_bound(run, run.at(run.times, ("x", "dx", "dtheta"))):

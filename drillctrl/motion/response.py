@@ -199,7 +199,8 @@ class _Start:
         options: dict[str, Any],
     ) -> None:
         plant, point = case.physics("the response of a bit")
-        self.case, self.frequency, self.options = case, frequency, options
+        self.case, self.frequency = case, frequency
+        self.options = {"backwards": "stop", **options}
         self.speed = amplitude * point.omega0
         self.per_run = _PER_RUN if len(plant.state_names) <= _LONG else _PER_LONG_RUN
         period = 2.0 * math.pi / frequency

@@ -47,6 +47,7 @@ def settings_for(
     duration: float,
     linear: bool,
     multiple: bool,
+    backwards: bool,
     rtol: float,
     atol: float,
 ) -> data.Settings:
@@ -57,6 +58,7 @@ def settings_for(
     whole, real = np.zeros(data.ROWS, dtype=np.int64), np.zeros(data.LIMITS + 2 * m)
     whole[[data.STATES, data.INPUTS, data.OUTPUTS]] = n, m, p
     whole[data.LINEAR], whole[data.MULTIPLE] = linear, multiple
+    whole[data.BACKWARDS] = backwards
     real[[data.WEIGHT, data.TORQUE]] = arrays.steady
     real[data.CUT] = structure.steady_depth
     real[[data.BY_WEIGHT, data.BY_TORQUE]] = arrays.E[1, 0], arrays.E[3, 1]
@@ -155,7 +157,7 @@ def _scales(structure: Structure) -> tuple[float, ...]:
     string = structure.arrays
     force, moment = np.abs([string.E[1, 0], string.E[3, 1]]) * string.steady + 1.0
     rate, depth = max(structure.penetration_rate, 1e-3), max(structure.steady_depth, 1e-3)
-    scales = structure.omega0, moment, moment, rate, force, force, depth, 1.0, 1.0
+    scales = structure.omega0, moment, moment, rate, force, force, depth, 1.0, 1.0, 1.0
     return tuple(float(scale) for scale in scales)
 
 
@@ -203,7 +205,8 @@ def check_start(
             raise InputError("start", repr(start), "a past of the same plant")
         if (start.model == "linear") != linear:
             raise InputError("model", "linear" if linear else "nonlinear", "that of the past")
-        low -= float(start.state[3])
+        # A bit that turns back already may go on so.
+        low = min(0.0, low - float(start.state[3]))
     elif start != "steady":
         if linear:
             raise InputError("start", start, "steady for the linear model")
@@ -256,7 +259,7 @@ def begin(
         )
     control.take_sample(settings, history, first, ints, reals, 0.0, y)
     work = march.workplace(settings)
-    march.enter(settings, history, first, ints, chain, data.BEGIN, 0.0, y, work)
+    march.enter(settings, history, first, ints, reals, chain, data.BEGIN, 0.0, y, work)
     return standing
 
 
@@ -266,7 +269,7 @@ def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     n, m = structure.arrays.B.shape
     chain = np.zeros(data.LATE, dtype=np.int64)
     following = np.ones(data.DELAYS, dtype=np.int64)
-    ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(3)
+    ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(march.REALS)
     ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
     y = np.zeros(data.vector_length(n, m))
     return March(settings, empty_history(room, n, m), ints, reals, y, chain, following, 1)
@@ -328,10 +331,12 @@ def _look_back(standing: March, structure: Structure, settings: data.Settings, s
 
 def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march that goes on from what another has left behind."""
-    march, breaks = (kernel(name, structure.physics) for name in ("march", "breaks"))
+    march, breaks, interpolate = (
+        kernel(name, structure.physics) for name in ("march", "breaks", "interpolate")
+    )
     steps = len(past.real)
     standing = _blank(structure, settings, steps + room)._replace(first=steps)
-    _, history, ints, _, y, chain, following, _ = standing
+    _, history, ints, reals, y, chain, following, _ = standing
     history.real[:steps], history.whole[:steps] = past.real, past.whole
     y[: past.state.size] = past.state
     last = past.whole[-1]
@@ -343,7 +348,13 @@ def _resume(past: Past, structure: Structure, settings: data.Settings, room: int
     _look_back(standing, structure, settings, steps)
     if past.model == "nonlinear":
         chain[:] = last[[data.LAG, data.FACE]]
-        passes = int(last[data.PASSES])
+        passes = ints[march.I_PASSES] = int(last[data.PASSES])
+        if last[data.BEHIND]:
+            # The lag in angle stays where it was when the bit turned back.
+            turned = interpolate.furthest(history, steps - 1, 0.0, y[2])
+            ints[march.I_BEHIND], reals[march.TURNED_T : march.REALS] = 1, turned
+            following[: data.LATE] = chain + 1
+            return standing
         where = settings, history, steps, chain, following, passes, 0.0, y[2]
         ints[march.I_PASSES] = breaks.retrace(*where, 1e-13 * (1.0 + abs(y[2])))
     return standing

@@ -88,7 +88,7 @@ def figures(run: Simulation) -> Figures:
     stuck = sum(max(0.0, b - max(a, since)) for a, b in run.phases("stuck")) / (end - since)
     swing = float(np.ptp(speed)) / (2.0 * mean) if mean > 1e-9 * run.point.omega0 else None
     fed = _feed(run, whole, tail)
-    outcome = _bounded(run, tail, stuck, fed)
+    outcome = Outcome.TURNS_BACK if run.phases("reverse") else _bounded(run, tail, stuck, fed)
     return Figures(outcome, swing, stuck, fed, largest)
 
 

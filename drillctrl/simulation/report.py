@@ -89,6 +89,16 @@ def _load_lines(run: Simulation) -> list[tuple[str, str]]:
     return lines
 
 
+def _backwards_lines(run: Simulation) -> list[tuple[str, str]]:
+    """Say how often the bit turned back, and for how much of the whole run it was behind."""
+    times = run.summary.reversals
+    if not times:
+        return []
+    behind = sum(b - a for a, b in run.phases("behind")) / float(run.times[-1])
+    told = f"{times} time{'s' if times > 1 else ''}, until where it turned {behind:.1%} of the run"
+    return [("Turns back", told)]
+
+
 def _chatter_lines(run: Simulation) -> list[tuple[str, str]]:
     """Say that gains act like a relay, where that used up the steps."""
     last = np.diff(run.times)[-_LAST_STEPS:]
@@ -187,6 +197,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         ("Bit speed", f"{speed}{least:.6g} to {most:.6g}"),
         ("Axial", f"{_millimetres(run, lowest, highest)}x from {lowest:.6g} to {highest:.6g}"),
         *_load_lines(run),
+        *_backwards_lines(run),
         ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
     ]
     if run.controller is not None:

@@ -19,6 +19,7 @@ from drillctrl.simulation.structure import Structure, structure_of
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
+BACKWARDS = ("rest", "stop")
 LONGEST = 1e6
 TRIES = 400_000
 
@@ -48,6 +49,7 @@ def checked_run(
     initial: Mapping[str, float] | None = None,
     model: str = "nonlinear",
     cutting: str = "multiple",
+    backwards: str = "rest",
     rtol: float = 1e-8,
     atol: float | None = None,
     max_step: float = math.inf,
@@ -59,7 +61,7 @@ def checked_run(
 
     Parameters
     ----------
-    where, scenario, duration, initial, model, cutting, rtol, atol, max_step, max_steps
+    where, scenario, duration, initial, model, cutting, backwards, rtol, atol, max_step, max_steps
         As in `simulate`, and so is ``controller``.
     structure : Structure, optional
         That of the case.
@@ -79,6 +81,8 @@ def checked_run(
         raise InputError("model", model, f"one of {', '.join(MODELS)}")
     if cutting not in CUTTINGS:
         raise InputError("cutting", cutting, f"one of {', '.join(CUTTINGS)}")
+    if backwards not in BACKWARDS:
+        raise InputError("backwards", backwards, f"one of {', '.join(BACKWARDS)}")
     if scenario is not None and initial is not None:
         raise InputError("initial", dict(initial), "left out where there is a scenario")
     if scenario is None:
@@ -104,6 +108,7 @@ def simulate(
     scenario: Scenario | None = None,
     model: str = "nonlinear",
     cutting: str = "multiple",
+    backwards: str = "rest",
     rtol: float = 1e-8,
     atol: float | None = None,
     max_step: float = math.inf,
@@ -132,6 +137,11 @@ def simulate(
     cutting : {"multiple", "single"}
         Whether the rock face is the deepest of all passes before, or the last pass
         alone (Eq. 7). They agree as long as the bit does not leave the rock.
+    backwards : {"rest", "stop"}
+        What becomes of a bit that turns back in the rock or off it. Until it is again where it
+        turned, ``"rest"`` lets its cutters rest on the face that they had before them then: they
+        press as at Φ' = 0 and bear no torque, wear flats rub either way. ``"stop"`` ends the run
+        with status ``"reverse rotation"``.
     rtol, atol : float
         Relative and absolute error of a step; ``atol`` is ``rtol``/100 unless given.
     max_step : float
@@ -159,9 +169,9 @@ def simulate(
     Notes
     -----
     Steps are of the Dormand-Prince pair 5(4) and end at every event and wherever a break of
-    the history meets the delay. Rotation backwards ends the run: Eq. 3 says that nothing is
-    cut then, but neither Eq. 8 nor the rock face says what is cut when the bit comes back
-    over what it had cut already.
+    the history meets the delay. Of rotation backwards Eq. 3 says that nothing is cut, but
+    neither Eq. 8 nor the rock face says what the bit meets in what it had cut already:
+    ``backwards="rest"`` is a convention, and each time is an event.
     """
     if time_limit != math.inf:
         checked_number("time_limit", time_limit, 0.0, open_low=True)
@@ -181,6 +191,7 @@ def simulate(
         initial=initial,
         model=model,
         cutting=cutting,
+        backwards=backwards,
         rtol=rtol,
         atol=atol,
         max_step=max_step,
@@ -194,6 +205,7 @@ def simulate(
         duration=duration,
         linear=linear,
         multiple=cutting == "multiple",
+        backwards=backwards == "rest",
         rtol=rtol,
         atol=atol,
     )

@@ -22,7 +22,7 @@ class Status(_Told):
     """How a run ended."""
 
     DONE = "done", "the run lasted as long as was asked"
-    REVERSED = "reverse rotation", "the bit turned backwards, for which the model has no face"
+    REVERSED = "reverse rotation", "the bit turned backwards"
     STEP_LIMIT = "step limit", "the steps that were permitted are used up"
     DIVERGED = "diverges", "the motion grew beyond what a bounded motion of the rig reaches"
     INTERRUPTED = "interrupted", "the run was stopped by hand"

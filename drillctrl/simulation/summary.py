@@ -49,6 +49,8 @@ class Summary:
         Numbers of events and of steps over the whole run.
     elapsed_seconds : float
         Wall time of the integration.
+    reversals : int
+        How often the bit turned back over the whole run.
     settling_time : float or None
         When |x| and |θ| stay below 2 % of their largest values; see `settling_time`.
     """
@@ -68,6 +70,7 @@ class Summary:
     steps: int
     elapsed_seconds: float
     settling_time: float | None = None
+    reversals: int = 0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields by name."""
@@ -117,6 +120,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         steps=simulation.steps,
         elapsed_seconds=simulation.elapsed_seconds,
         settling_time=_settled_from(simulation, run),
+        reversals=len(simulation.phases("behind")),
     )
 
 

@@ -32,7 +32,8 @@ class Event(NamedTuple):
     time : float
         When.
     name : str
-        ``"stick"``, ``"release"``, ``"reverse"`` (torsion); ``"hold"``, ``"advance"``,
+        ``"stick"``, ``"release"``, ``"reverse"`` (torsion); ``"resume"`` (the bit is back where
+        it turned back); ``"hold"``, ``"advance"``,
         ``"lift"`` (Z' becomes 0, positive, negative in contact); ``"loss"``, ``"return"``
         (of contact); ``"saturate"``, ``"desaturate"`` (an input meets or leaves its limit, or
         an actuator its limit of rate; a sampled controller has no such instants).
@@ -247,10 +248,10 @@ class Trace:
         contact = {0: "loss", 1: "return"}
         found = []
         start, on_rock = self._column("START"), self._column("CONTACT")
-        saturated = self._column("SATURATED")
+        saturated, behind = self._column("SATURATED"), self._column("BEHIND")
         columns = {name: self._column(name.upper()) for name in ("contact", "torsion", "axial")}
         changed = np.zeros(self.steps + 1, dtype=bool)
-        changed[2:] = saturated[2:] != saturated[1:-1]
+        changed[2:] = (saturated[2:] != saturated[1:-1]) | (behind[2:] < behind[1:-1])
         for column in columns.values():
             changed[2:] |= column[2:] != column[1:-1]
         for j in np.flatnonzero(changed):
@@ -261,6 +262,8 @@ class Trace:
                 meaningless = name == "axial" and not (on_rock[j] and on_rock[j - 1])
                 if now != before and not meaningless:
                     found.append(Event(time, names[now]))
+            if behind[j] < behind[j - 1]:
+                found.append(Event(time, "resume"))
             before, now = int(saturated[j - 1]), int(saturated[j])
             if now & ~before:
                 found.append(Event(time, "saturate"))
@@ -273,14 +276,17 @@ class Trace:
 
         Parameters
         ----------
-        name : {"stuck", "held", "lost", "saturated"}
-            Torsional stick, axial hold, loss of contact, an input or actuator at its limit.
+        name : {"stuck", "held", "lost", "saturated", "reverse", "behind"}
+            Torsional stick, axial hold, loss of contact, an input or actuator at its limit;
+            rotation backwards, and until the bit is again where it turned back.
         """
         modes = {
             "stuck": self._column("TORSION") == data.STUCK,
             "held": self._column("AXIAL") == data.HELD,
             "lost": self._column("CONTACT") == 0,
             "saturated": self._column("SATURATED") != 0,
+            "reverse": self._column("TORSION") == data.REVERSE,
+            "behind": self._column("BEHIND") != 0,
         }
         if name not in modes:
             raise InputError("phase", name, f"one of {', '.join(modes)}")

@@ -127,6 +127,7 @@ def _outcome(trial: Trial, alpha: float, duration: float, size: float) -> tuple[
         duration=duration,
         initial=start,
         cutting=trial.cutting,
+        backwards="stop",
         rtol=trial.rtol,
         atol=1e-3 * size * trial.rtol,
     )

@@ -125,6 +125,8 @@ def test_a_bit_off_the_rock_for_turns_on_end_finds_the_face_again():
 def test_a_bit_that_falls_behind_and_turns_back_has_turned_back():
     where = at(table1(), 60.959438957012026, 10.35077280309002)
     kick = {"dx": 0.018859656668560366, "dtheta": 0.2244900799947762}
-    run = simulate(where, duration=170.0, initial=kick, rtol=1e-5, cutting="single")
+    run = simulate(
+        where, duration=170.0, initial=kick, rtol=1e-5, cutting="single", backwards="stop"
+    )
     assert run.status == "reverse rotation"
     assert figures(run).outcome == "turns-back"

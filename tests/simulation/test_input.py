@@ -85,9 +85,10 @@ def test_step_limit_returns_what_there_is():
     assert np.isfinite(run.motion.x).all()
 
 
-def test_reverse_rotation_ends_the_run():
+def test_reverse_rotation_ends_the_run_if_asked():
     point = OperatingPoint(2.209568, 0.329848, 14.14, 1.596, 0.0506, 0.0499, lam=10.55)
-    run = simulate(point, duration=300.0, initial={"dx": 0.1, "dtheta": 0.1}, cutting="single")
+    kick = {"dx": 0.1, "dtheta": 0.1}
+    run = simulate(point, duration=300.0, initial=kick, cutting="single", backwards="stop")
     assert run.status == "reverse rotation"
     assert 0.0 < run.times[-1] < 300.0
     assert point.omega0 + run.motion.dtheta[-1] == pytest.approx(0.0, abs=1e-9)

@@ -106,14 +106,14 @@ def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     then[0] = state[0] + 25.0 * tau - depth / 4.0
     expected = rhs_function(CASE.plant)(state, then, tau, [0.1, 0.2], p).full().ravel()
     settings = settings_for(
-        string, None, np.zeros((1, 9)), duration=1.0, linear=False, multiple=True, rtol=1e-8,
-        atol=1e-10,
+        string, None, np.zeros((1, 9)), duration=1.0, linear=False, multiple=True, backwards=False,
+        rtol=1e-8, atol=1e-10,
     )  # fmt: skip
     arrays = string.arrays
     alone = arrays.A @ state + arrays.B @ [0.1, 0.2]
     load = model.bit_load(
         alone[1], alone[3], depth, (z_rate, turn), contact, getattr(data, torsion),
-        getattr(data, axial), settings.real, settings.q, np.zeros(data.P_ROOM),
+        getattr(data, axial), 0, settings.real, settings.q, np.zeros(data.P_ROOM),
     )  # fmt: skip
     found = alone + arrays.E @ (np.array(load) - arrays.steady)
     np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -72,7 +72,7 @@ def time_to_turn(angle, rate, acceleration):
 @inner
 def angle_limits(history, bit, steps, mode, chain, following, t, y, acceleration):
     """Return the time to the nearest break seen through the angle, and to the last step."""
-    if mode.torsion == STUCK:
+    if mode.torsion == STUCK or mode.behind == 1:
         return np.inf, np.inf
     rate = rates((0.0, 0.0, 0.0, y[3]), bit)[1]
     nearest = np.inf
@@ -88,7 +88,7 @@ def angle_limits(history, bit, steps, mode, chain, following, t, y, acceleration
 def least_angle_left(history, bit, steps, mode, following, t, theta):
     """Least angle left over all lags, and which lag it is (-1: no break ahead)."""
     least, which = np.inf, -1
-    if mode.torsion == STUCK:
+    if mode.torsion == STUCK or mode.behind == 1:
         return least, which
     for k in range(lags_of(mode)):
         b = following[k]
@@ -102,6 +102,8 @@ def least_angle_left(history, bit, steps, mode, following, t, theta):
 @inner
 def follow(settings, history, steps, mode, chain, t, theta):
     """Move the places of the lagged instants along, within their smooth pieces."""
+    if mode.behind == 1:
+        return
     pitch = pitch_of(settings.bit)
     for k in range(lags_of(mode)):
         extra = pitches_beyond(mode, k) * pitch
@@ -134,5 +136,5 @@ def retrace(settings, history, steps, chain, following, passes, t, theta, tolera
 
 @inner
 def passed_on(level, stuck, gain):
-    """Level of the break that a delayed break makes; the lag jumps over a stuck bit."""
+    """Level of the break that a delayed break makes; the lag jumps over what gains no angle."""
     return 2 if stuck else level + gain

@@ -22,7 +22,7 @@ from .data import (
     STATES,
     T_ON,
 )
-from .interpolate import locate_angle, state_at, step_at
+from .interpolate import furthest, locate_angle, state_at, step_at
 from .jit import entry, inner
 from .model import add_earlier, piece_at, within
 
@@ -82,7 +82,8 @@ def take_sample(settings, history, steps, ints, reals, t, y):
     lag = settings.schedule[gains, PAST_AGE]
     if settings.whole[CURRENT_DELAY] == 1:
         theta, near = state_at(history, j_now, s_now)[2], history.whole[j_now, LAG]
-        j, s = locate_angle(history, settings.bit, steps, near, t_now, theta, 0.0)
+        there, theta = furthest(history, j_now, t_now, theta)
+        j, s = locate_angle(history, settings.bit, steps, near, there, theta, 0.0)
         lag = t_now - history.real[j, START] - s * history.real[j, LENGTH]
     j_then, s_then = place_of(history, steps, t_now - lag)
     earlier = sample - int(np.rint(lag / period))

@@ -19,9 +19,11 @@ DOWN, HELD, UP = 0, 1, 2
 # Events that are zeros of functions which are positive in the present mode.
 TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2
 AXIAL_RATE, HELD_TO_UP, HELD_TO_DOWN, DEPTH = 3, 4, 5, 6
-BARRIER, BEGIN = 7, 8
+# The bit is back at the furthest angle that it has reached.
+RESUME = 7
+BARRIER, BEGIN = 8, 9
 # Input i at its limit: AT_LIMIT + i; its actuator at its fastest: AT_LIMIT + m + i.
-AT_LIMIT = 9
+AT_LIMIT = 10
 
 # How the march stopped.
 DONE, MORE_ROOM, COLLAPSE, REVERSED, NOT_FINITE, PAUSED, DIVERGED, INTERRUPTED = range(8)
@@ -36,9 +38,10 @@ NEAR, FAR, LATE, DELAYS = 0, 1, 2, 5
 
 # Entries of ``Settings.whole``: sizes of the plant, switches, and from ROWS on the matrix.
 STATES, INPUTS, OUTPUTS = 0, 1, 2
-# PAST: there are gains on delayed outputs; FED: place of the list of outputs that are fed back.
-(LINEAR, MULTIPLE, FEEDBACK, PAST, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK, FED,
- ROWS) = range(3, 13)  # fmt: skip
+# PAST: there are gains on delayed outputs; BACKWARDS: whether a bit may turn back; FED: place of
+# the list of outputs that are fed back.
+(LINEAR, MULTIPLE, FEEDBACK, PAST, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK, BACKWARDS,
+ FED, ROWS) = range(3, 14)  # fmt: skip
 # Entries of ``Settings.real``. Weight and torque on bit and depth of cut in steady drilling;
 # what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1].
 WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
@@ -56,7 +59,7 @@ DRIVE_T, DRIVE_X, DRIVE_THETA, DRIVE_STRENGTH = 0, 1, 4, 7
 # Entries of `probe`, beside an event function's ingredients; behind them, from P_ROOM on, what
 # is left until each limit is met (2 m, negative beyond), and the inputs (m).
 (P_DEPTH, P_FORWARD, P_REVERSE, P_UP, P_DOWN, P_PRESSED, P_DELAY, P_WEIGHT, P_TORQUE,
- P_ROOM) = range(10)  # fmt: skip
+ P_LEFT, P_ROOM) = range(11)  # fmt: skip
 
 # Rows of `Work`.
 STAGES = 7
@@ -65,7 +68,7 @@ END, INCREMENT, BETWEEN = 0, 1, 2
 # Columns of `History`.
 START, LENGTH, X, THETA, OTHERS = 0, 1, 2, 8, 14
 QUINTIC, QUARTIC = 6, 5
-CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, SATURATED, WHOLES = range(9)
+CONTACT, TORSION, AXIAL, LEVEL, LAG, FACE, PASSES, SATURATED, BEHIND, WHOLES = range(10)
 
 # What is known of the bit at an instant; the columns of a sample start with these.
 BIT_COLUMNS = ("delay", "depth", "pressed", "weight_on_bit", "torque_on_bit", "contact")
@@ -166,7 +169,7 @@ class History(NamedTuple):
     whole : int array, (cap, WHOLES)
         CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
         t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade
-        pitches it lies back; SATURATED: see `Mode`.
+        pitches it lies back; SATURATED, BEHIND: see `Mode`.
     """
 
     real: Any
@@ -176,7 +179,8 @@ class History(NamedTuple):
 class Mode(NamedTuple):
     """One smooth branch of the model, and where its delayed signals are found.
 
-    Bit i of ``saturated`` says that event AT_LIMIT + i has set in.
+    Bit i of ``saturated`` says that event AT_LIMIT + i has set in. A bit that has turned back
+    is ``behind`` until it is again where it turned, at ``turned_t`` and ``turned_theta``.
     """
 
     contact: int
@@ -192,6 +196,9 @@ class Mode(NamedTuple):
     piece: int
     gains: int
     on: int
+    behind: int
+    turned_t: float
+    turned_theta: float
 
 
 class Work(NamedTuple):

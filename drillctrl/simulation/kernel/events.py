@@ -22,11 +22,13 @@ from .data import (
     P_DEPTH,
     P_DOWN,
     P_FORWARD,
+    P_LEFT,
     P_REVERSE,
     P_ROOM,
     P_UP,
     RELEASE_FORWARD,
     RELEASE_REVERSE,
+    RESUME,
     SAMPLED,
     SCALE,
     STAGES,
@@ -63,6 +65,8 @@ def watched(settings, kind, mode):
         return mode.torsion == STUCK
     if kind == AXIAL_RATE:
         return mode.contact == 1 and mode.axial != HELD
+    if kind == RESUME:
+        return mode.behind == 1 and mode.torsion == FORWARD
     if kind in (HELD_TO_UP, HELD_TO_DOWN):
         return mode.contact == 1 and mode.axial == HELD
     return True
@@ -82,6 +86,8 @@ def value_of(kind, mode, probe, dx, dtheta, bit):
         return probe[P_UP]
     if kind == HELD_TO_DOWN:
         return -probe[P_DOWN]
+    if kind == RESUME:
+        return probe[P_LEFT]
     if kind == DEPTH:
         return probe[P_DEPTH] if mode.contact == 1 else -probe[P_DEPTH]
     axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), bit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .data import (
+    BEHIND,
     LAST_LEVEL,
     LENGTH,
     LEVEL,
@@ -97,6 +98,22 @@ def angle_slope(history, bit, j, s):
 
 
 @inner
+def gains_no_angle(history, j):
+    """Whether the bit comes to no new angle on step j, which the lag in angle jumps over."""
+    return history.whole[j, TORSION] == STUCK or history.whole[j, BEHIND] == 1
+
+
+@entry
+def furthest(history, j, t, theta):
+    """Time and θ at which the bit reached its furthest angle until t, which is on step j."""
+    if history.whole[j, BEHIND] == 0:
+        return t, theta
+    while history.whole[j - 1, BEHIND] == 1:
+        j -= 1
+    return history.real[j, START], history.real[j, THETA]
+
+
+@inner
 def locate_angle(history, bit, steps, j, t, theta, extra):
     """Find the step and s at which the bit was a blade pitch (and ``extra``) back.
 
@@ -119,7 +136,7 @@ def locate_angle(history, bit, steps, j, t, theta, extra):
         after > 0.0
         and j + 1 < steps
         and history.whole[j + 1, LEVEL] > LAST_LEVEL
-        and history.whole[j + 1, TORSION] != STUCK
+        and not gains_no_angle(history, j + 1)
     ):
         j += 1
         after = beyond(history, bit, j, 1.0, t, theta, extra)
@@ -193,9 +210,11 @@ def step_before_angle(history, bit, j, t, theta, extra, tolerance):
 
     At a break it is the step after it, since the bit goes on forward.
     """
-    while j > 0 and beyond(history, bit, j, 0.0, t, theta, extra) < -tolerance:
+    while j > 0 and (
+        history.whole[j, BEHIND] == 1 or beyond(history, bit, j, 0.0, t, theta, extra) < -tolerance
+    ):
         j -= 1
-    while history.whole[j, TORSION] == STUCK or (
+    while gains_no_angle(history, j) or (
         j > 0 and beyond(history, bit, j, 1.0, t, theta, extra) >= -tolerance
     ):
         j += 1

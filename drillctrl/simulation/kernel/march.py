@@ -16,6 +16,7 @@ from .control import next_clock, take_sample
 from .data import (
     ACTUATOR,
     AT_LIMIT,
+    BACKWARDS,
     BARRIER,
     BOUNDS,
     COLLAPSE,
@@ -36,18 +37,18 @@ from .data import (
     P_ROOM,
     PAUSED,
     RATE_FEEDBACK,
+    RESUME,
     REVERSE,
     REVERSED,
     STAGES,
     START,
     STATES,
     STUCK,
-    TORSION,
     Mode,
     Work,
 )
 from .events import NONE, SHORTEST, first_zero, refine, watched
-from .interpolate import locate_time, step_at
+from .interpolate import gains_no_angle, locate_time, step_at
 from .jit import entry, inner
 from .model import lag_of, rate_of_change
 from .physics import rates
@@ -56,15 +57,15 @@ from .switch import next_mode, next_saturation, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
- REJECTED, EVALUATIONS, I_SATURATED, LAG0) = range(15)  # fmt: skip
-TIME, STEP, NEXT_SAMPLE = range(3)
+ REJECTED, EVALUATIONS, I_SATURATED, I_BEHIND, LAG0) = range(16)  # fmt: skip
+TIME, STEP, NEXT_SAMPLE, TURNED_T, TURNED_THETA, REALS = range(6)
 REFINE = 6
 # A break that is nearer than this, relative to the angle turned, is met.
 PASSED = 5e-14
 
 
 @inner
-def mode_of(ints, chain):
+def mode_of(ints, reals, chain):
     """Collect the present mode."""
     passes = ints[I_PASSES]
     return Mode(
@@ -81,6 +82,9 @@ def mode_of(ints, chain):
         ints[PIECE],
         ints[GAINS],
         ints[ON],
+        ints[I_BEHIND],
+        reals[TURNED_T],
+        reals[TURNED_THETA],
     )
 
 
@@ -97,13 +101,17 @@ def workplace(settings):
 
 
 @entry
-def enter(settings, history, steps, ints, chain, kind, t, y, work):
+def enter(settings, history, steps, ints, reals, chain, kind, t, y, work):
     """Enter the mode that follows an event, a break or the start."""
-    mode = mode_of(ints, chain)
+    if kind == RESUME:
+        ints[I_BEHIND] = 0
+    mode = mode_of(ints, reals, chain)
     if kind < AT_LIMIT:
         branch = next_mode(settings, history, steps, mode, kind, t, y, work)
         ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
-        mode = mode_of(ints, chain)
+        if branch[1] == REVERSE and ints[I_BEHIND] == 0:
+            ints[I_BEHIND], reals[TURNED_T], reals[TURNED_THETA] = 1, t, y[2]
+        mode = mode_of(ints, reals, chain)
     ints[I_SATURATED] = next_saturation(settings, history, steps, mode, kind, t, y, work)
 
 
@@ -159,17 +167,17 @@ def seek_past(settings, history, steps, ints, following, t):
 
 
 @inner
-def pass_angle_break(settings, history, steps, ints, chain, following, which, t, theta):
+def pass_angle_break(settings, history, steps, ints, reals, chain, following, which, t, theta):
     """Move the lag in angle over the break that it has met; return the level this brings."""
     b, whole = following[which], settings.whole
     gain = 1 if whole[RATE_FEEDBACK] + whole[CURRENT_DELAY] == 2 else 2
-    level = passed_on(history.whole[b, LEVEL], history.whole[b, TORSION] == STUCK, gain)
+    level = passed_on(history.whole[b, LEVEL], gains_no_angle(history, b), gain)
     chain[which] = b
     tolerance = 2.0 * PASSED * turned_by(settings, t, theta)
     before = ints[I_PASSES]
     passes = retrace(settings, history, steps, chain, following, before, t, theta, tolerance)
     ints[I_PASSES] = passes
-    follow(settings, history, steps, mode_of(ints, chain), chain, t, theta)
+    follow(settings, history, steps, mode_of(ints, reals, chain), chain, t, theta)
     # Another pass may have left a step in the face; and a pitch on the change is to be seen.
     return level if passes == before else min(level, 2)
 
@@ -230,9 +238,9 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             return DIVERGED
         if steps + 1 >= history.real.shape[0]:
             return MORE_ROOM
-        if ints[I_TORSION] == REVERSE:
+        if ints[I_TORSION] == REVERSE and settings.whole[BACKWARDS] == 0:
             return REVERSED
-        mode = mode_of(ints, chain)
+        mode = mode_of(ints, reals, chain)
         level = ints[I_LEVEL]
         if not known:
             rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
@@ -248,10 +256,10 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             if which >= 0 and left <= PASSED * turned_by(settings, t, y[2]):
                 # No step fits in between.
                 level = pass_angle_break(
-                    settings, history, steps, ints, chain, following, which, t, y[2]
+                    settings, history, steps, ints, reals, chain, following, which, t, y[2]
                 )
                 if level <= 2:
-                    enter(settings, history, steps, ints, chain, BARRIER, t, y, work)
+                    enter(settings, history, steps, ints, reals, chain, BARRIER, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level)
                 known = False
                 continue
@@ -288,7 +296,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
 
         # End at the break that the lag in angle has met.
         reached = -1
-        if not linear and mode.torsion != STUCK:
+        if not linear and mode.torsion != STUCK and mode.behind == 0:
             turns = turned_by(settings, t, new[2])
             for _ in range(REFINE):
                 left, which = least_angle_left(history, bit, steps, mode, following, t + h, new[2])
@@ -328,7 +336,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                 if ints[STALLS] > 20:
                     return COLLAPSE
                 snap(kind, y, bit)
-                enter(settings, history, steps, ints, chain, kind, t, y, work)
+                enter(settings, history, steps, ints, reals, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
                 known = False
                 continue
@@ -354,7 +362,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             level = min(
                 level,
                 pass_angle_break(
-                    settings, history, steps, ints, chain, following, reached, t, y[2]
+                    settings, history, steps, ints, reals, chain, following, reached, t, y[2]
                 ),
             )
         gains = ints[GAINS]
@@ -374,6 +382,6 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                 stages[0, i] = stages[STAGES - 1, i]
         if kind >= 0 or level <= 2:
             cause = kind if kind >= 0 else BARRIER
-            enter(settings, history, steps, ints, chain, cause, t, y, work)
+            enter(settings, history, steps, ints, reals, chain, cause, t, y, work)
         ints[I_LEVEL] = level
     return PAUSED

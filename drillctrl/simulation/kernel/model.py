@@ -28,6 +28,7 @@ from .data import (
     P_DEPTH,
     P_DOWN,
     P_FORWARD,
+    P_LEFT,
     P_PRESSED,
     P_REVERSE,
     P_ROOM,
@@ -48,7 +49,7 @@ from .data import (
 )
 from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
 from .jit import entry, inner
-from .physics import depth, load, rates
+from .physics import depth, load, rates, turned
 
 
 @inner
@@ -211,13 +212,19 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     out : array
         Takes the rates of change of states and actuators.
     probe : array
-        Takes depth, accelerations at the limits of what contact can bear, loads, delay, inputs.
+        Takes depth, accelerations at the limits of what contact can bear, loads, delay, the angle
+        left to where the bit turned back, inputs.
     """
     bit, n = settings.bit, settings.whole[STATES]
     state = (y[0], y[1], y[2], y[3])
     if settings.whole[LINEAR] == 1:
         return linear_rate(settings, history, steps, mode, t, y, out, probe)
-    j, s = locate_angle(history, bit, steps, mode.lag, t, y[2], 0.0)
+    there, theta, probe[P_LEFT] = t, y[2], 0.0
+    if mode.behind == 1:
+        there, theta = mode.turned_t, mode.turned_theta
+        now, then = (0.0, 0.0, y[2], 0.0), (0.0, 0.0, theta, 0.0)
+        probe[P_LEFT] = -turned(now, then, t - there, bit) - pitch_of(bit)
+    j, s = locate_angle(history, bit, steps, mode.lag, there, theta, 0.0)
     if j < 0:
         return False
     delay = t - history.real[j, START] - s * history.real[j, LENGTH]
@@ -225,7 +232,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     since = delay
     if mode.passes > 1:
         extra = (mode.passes - 1) * pitch_of(bit)
-        j, s = locate_angle(history, bit, steps, mode.face, t, y[2], extra)
+        j, s = locate_angle(history, bit, steps, mode.face, there, theta, extra)
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
     d = depth(state, state_at(history, j, s), since, bit)
     strength = 1.0
@@ -246,6 +253,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         mode.contact,
         mode.torsion,
         mode.axial,
+        mode.behind,
         settings.real,
         settings.q,
         probe,
@@ -263,11 +271,12 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
 
 
 @entry
-def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, probe):
+def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, q, probe):
     """Weight and torque on bit, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
     At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
-    torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5).
+    torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5). Behind the furthest
+    angle that the bit has reached they rest on the rock with that weight, and bear no torque.
 
     Parameters
     ----------
@@ -277,7 +286,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, 
         Depth that is cut in contact, times the strength of the rock.
     speeds : tuple
         Z' and Φ'.
-    contact, torsion, direction : int
+    contact, torsion, direction, behind : int
         The mode; ``direction`` is the axial one.
     real, q : array
         As in `Settings`.
@@ -289,11 +298,12 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, real, q, 
     angular -= by_torque * real[TORQUE]
     weight, torque, pressed = 0.0, 0.0, 0.0
     if contact == 1:
-        sign = 1.0
-        if torsion == REVERSE:
-            sign, cut = -1.0, 0.0
-        light = load((cut, 0.0, sign), speeds, q)
-        full = load((cut, 1.0, sign), speeds, q)
+        sign, turning = (-1.0, 0.0) if torsion == REVERSE else (1.0, cut)
+        light = load((turning, 0.0, sign), speeds, q)
+        full = load((turning, 1.0, sign), speeds, q)
+        if behind == 1:
+            light = load((cut, 0.0, 1.0), speeds, q)[0], load((0.0, 0.0, sign), speeds, q)[1]
+            full = load((cut, 1.0, 1.0), speeds, q)[0], load((0.0, 1.0, sign), speeds, q)[1]
         up, down = axial + by_weight * light[0], axial + by_weight * full[0]
         probe[P_UP], probe[P_DOWN] = up, down
         if direction == DOWN:

@@ -6,6 +6,7 @@ import numpy as np
 
 from .data import (
     AXIAL,
+    BEHIND,
     C_CONTACT,
     C_DELAY,
     C_DEPTH,
@@ -38,7 +39,7 @@ from .data import (
     TORSION,
     Mode,
 )
-from .interpolate import step_at
+from .interpolate import furthest, step_at
 from .jit import entry, inner
 from .model import lag_of, piece_at, rate_of_change, row_of
 from .physics import load, rates
@@ -50,6 +51,7 @@ def mode_on(settings, history, j):
     """The mode in which step j was taken."""
     t = history.real[j, START] + 0.5 * history.real[j, LENGTH]
     lags = np.zeros(3, np.int64)
+    turned_t, turned_theta = furthest(history, j, t, 0.0)
     gains = piece_at(settings.schedule[:, SINCE], t)
     for i in range(3):
         lag = lag_of(settings, i, gains)
@@ -69,6 +71,9 @@ def mode_on(settings, history, j):
         piece_at(settings.drive[:, DRIVE_T], t),
         gains,
         1 if settings.whole[FEEDBACK] == 1 and t >= settings.real[T_ON] else 0,
+        history.whole[j, BEHIND],
+        turned_t,
+        turned_theta,
     )
 
 

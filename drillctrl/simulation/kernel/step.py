@@ -14,6 +14,7 @@ from .data import (
     ACTUATOR,
     ATOL,
     AXIAL,
+    BEHIND,
     CONTACT,
     END,
     FACE,
@@ -167,6 +168,7 @@ def record(settings, history, j, mode, t, h, y, work, level):
     whole[j, CONTACT], whole[j, TORSION], whole[j, AXIAL] = mode.contact, mode.torsion, mode.axial
     whole[j, LEVEL], whole[j, LAG], whole[j, FACE] = level, mode.lag, mode.face
     whole[j, PASSES], whole[j, SATURATED] = mode.passes, mode.saturated
+    whole[j, BEHIND] = mode.behind
 
 
 @inner

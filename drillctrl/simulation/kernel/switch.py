@@ -55,6 +55,9 @@ def with_branch(mode, contact, torsion, axial):
         mode.piece,
         mode.gains,
         mode.on,
+        mode.behind,
+        mode.turned_t,
+        mode.turned_theta,
     )
 
 

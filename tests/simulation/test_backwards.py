@@ -1,0 +1,167 @@
+"""A bit that turns back: against a program written from the convention, and through any start."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+import pytest
+
+from drillctrl import Controller, InputError, OperatingPoint, RigPoint, Scenario, simulate, table1
+from drillctrl.simulation.outcome import figures
+
+POINT = OperatingPoint(5.0, 0.2, 10.0, xi=0.1)
+# Torque that feeds the swing until the bit turns back.
+FED, KICK = 0.4, {"dx": 0.2, "dtheta": 3.0}
+CONTROLLER = Controller("pd", [0.0, FED])
+
+
+@numba.njit
+def euler(point, fed, kick, end, dt):
+    """Integrate with fixed steps; the face by the furthest angle, friction by what it can bear."""
+    omega, delta, psi, eta, xi, kappa, lam, beta, blades = point
+    feed = delta * omega
+    pitch = 2.0 * math.pi / blades
+    before = int(3.0 * pitch / omega / dt)
+    steps = int(end / dt)
+    count = before + steps + 1
+    furthest, place = np.empty(count), np.empty(count)
+    for i in range(before + 1):
+        furthest[i], place[i] = omega * (i - before) * dt, feed * (i - before) * dt
+    x, v, theta, w = 0.0, kick[0], 0.0, kick[1]
+    weight0, torque0 = psi * blades * delta * pitch + lam, blades * delta * pitch + beta
+    found, j = np.empty((steps + 1, 3)), 0
+    for i in range(before, before + steps + 1):
+        t = (i - before) * dt
+        angle = omega * t + theta
+        furthest[i] = angle if i == 0 else max(furthest[i - 1], angle)
+        place[i] = feed * t + x
+        found[i - before] = x, theta, furthest[i] - angle
+        lag = furthest[i] - pitch
+        while furthest[j + 1] < lag:
+            j += 1
+        share = (lag - furthest[j]) / (furthest[j + 1] - furthest[j])
+        cut = blades * (place[i] - place[j] - share * (place[j + 1] - place[j]))
+        touches = cut > 0.0
+        cut = max(cut, 0.0)
+        resting = furthest[i] > angle
+        # Axial: the wear flat bears what keeps Z' at 0, as far as it can.
+        pull = weight0 - 2.0 * xi * eta * v - eta * eta * x - psi * cut
+        down = feed + v
+        pressed = 0.0
+        if touches:
+            free = (down + dt * pull) / (dt * lam)
+            pressed = min(max(free, 0.0), 1.0)
+        v += dt * (pull - lam * pressed)
+        # Torsion: likewise at Φ' = 0, where cutters ahead bear torque too.
+        turn = torque0 - 2.0 * kappa * w - theta + fed * w
+        speed = omega + w
+        forward = (0.0 if resting else cut) + beta * pressed
+        after = speed + dt * turn
+        if after > dt * forward:
+            after -= dt * forward
+        elif after < -dt * beta * pressed:
+            after += dt * beta * pressed
+        else:
+            after = 0.0
+        x += dt * v
+        w = after - omega
+        theta += dt * w
+    return found
+
+
+def test_a_bit_that_turns_back_moves_as_the_convention_says():
+    run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, rtol=1e-10)
+    assert run.status == "done"
+    assert run.summary.reversals == len(run.phases("behind")) >= 1
+    p = POINT
+    groups = (p.omega0, p.delta0, p.psi, p.eta, p.xi, p.kappa, p.lam, p.beta, float(p.blades))
+    errors = []
+    for dt in (4e-5, 2e-5):
+        found = euler(groups, FED, (KICK["dx"], KICK["dtheta"]), 8.0, dt)
+        times = np.arange(len(found)) * dt
+        mine = run.at(np.minimum(times, 8.0), ("x", "theta"))
+        errors.append(max(abs(found[:, 0] - mine.x).max(), abs(found[:, 1] - mine.theta).max()))
+    # It turns back by 0.04 rad, and the plain program is of first order.
+    assert found[:, 2].max() > 0.04
+    assert errors[1] < 3e-4
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_weight_goes_on_where_the_bit_turns_back_and_torque_where_it_cuts_on():
+    run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, rtol=1e-10)
+    (back,) = [event.time for event in run.events if event.name == "reverse"]
+    (on,) = [event.time for event in run.events if event.name == "resume"]
+    times = np.array([back - 1e-6, back + 1e-6, on - 1e-6, on + 1e-6])
+    motion = run.at(times)
+    np.testing.assert_allclose(motion.weight_on_bit[0], motion.weight_on_bit[1], rtol=1e-5)
+    np.testing.assert_allclose(motion.weight_on_bit[2], motion.weight_on_bit[3], rtol=1e-5)
+    # Behind, the wear flats alone bear torque, either way.
+    inside = run.at(np.linspace(back, on, 501)[1:-1])
+    assert abs(inside.torque_on_bit).max() <= POINT.beta * (1.0 + 1e-9)
+    assert motion.torque_on_bit[1] < 0.0 < motion.torque_on_bit[2]
+    assert motion.torque_on_bit[3] > motion.torque_on_bit[2] + 0.5 * motion.depth[3]
+    # The face is that of where it turned back: the delay grows with time.
+    np.testing.assert_allclose(np.diff(inside.delay), np.diff(inside.times), rtol=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_a_run_goes_on_from_the_midst_of_turning_back(share):
+    scenario = Scenario(start="stick")
+    where = RigPoint(table1(), 4.0 * math.pi, 20 / 3600)
+    whole = simulate(where, duration=12.0, scenario=scenario, rtol=1e-10)
+    ((begin, end),) = whole.phases("behind")
+    when = begin + share * (end - begin)
+    first = simulate(where, duration=when, scenario=scenario, rtol=1e-10)
+    second = simulate(where, duration=12.0 - when, scenario=Scenario(start=first.past()))
+    times = np.linspace(0.0, second.duration, 300)
+    for name in ("x", "theta"):
+        there = getattr(whole.at(times + when), name)
+        np.testing.assert_allclose(getattr(second.at(times), name), there, atol=1e-7)
+
+
+@pytest.mark.parametrize("cutting", ["multiple", "single"])
+def test_no_run_breaks_off_because_the_bit_turns_back(cutting):
+    rng = np.random.default_rng(7)
+    reversals = 0
+    for _ in range(25):
+        speed, rate = rng.uniform(5.0, 19.0), rng.uniform(5.0, 60.0) / 3600.0
+        where = RigPoint(table1(), speed, rate)
+        gains = [rng.uniform(-1.0, 1.0), rng.uniform(0.0, 2.0)]
+        period = [None, 0.05][int(rng.integers(2))]
+        controller = Controller(
+            "pd", gains, limit=float(rng.choice([1.0, 3.0, 10.0])), period=period
+        )
+        start = {"dx": rng.uniform(-0.5, 0.5), "dtheta": rng.uniform(-1.5, 2.0)}
+        tolerance = 10.0 ** rng.uniform(-9.0, -5.0)
+        options = {"duration": 40.0, "initial": start, "rtol": tolerance, "cutting": cutting}
+        run = simulate(where, controller, **options)
+        assert run.status in ("done", "diverges"), (where, controller, options)
+        reversals += run.summary.reversals
+    assert reversals > 25
+
+
+def test_energy_of_a_bit_that_turns_back():
+    run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, rtol=1e-10)
+    motion = run.on_steps(9)
+    weight, torque = run.steady_load
+    power = motion.dx * (weight - motion.weight_on_bit)
+    power += motion.dtheta * (torque - motion.torque_on_bit + motion.torque)
+    p = POINT
+    power -= 2.0 * p.xi * p.eta * motion.dx**2 + 2.0 * p.kappa * motion.dtheta**2
+    ends = run.at([0.0, 8.0])
+    energy = 0.5 * (ends.dx**2 + ends.dtheta**2 + (p.eta * ends.x) ** 2 + ends.theta**2)
+    work = np.trapezoid(power, motion.times)
+    assert work == pytest.approx(energy[1] - energy[0], rel=1e-4)
+
+
+def test_what_is_told_and_switched():
+    run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK)
+    assert figures(run).outcome == "turns-back"
+    assert figures(run).swing is not None
+    stopped = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, backwards="stop")
+    assert stopped.status == "reverse rotation"
+    assert stopped.times[-1] == pytest.approx(run.phases("reverse")[0][0], abs=1e-6)
+    with pytest.raises(InputError, match="backwards = around.*rest, stop"):
+        simulate(POINT, duration=1.0, backwards="around")
