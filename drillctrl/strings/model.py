@@ -20,8 +20,8 @@ from drillctrl.strings.lump import lumped
 # cutting excites is counted in modes.
 TORSIONAL_FREQUENCY = 5.0
 AXIAL_FREQUENCY = 10.0
-_FEWEST_MODES = 10
-TOLERANCE = 1e-3
+_FEWEST_MODES = 8
+TOLERANCE = 2e-3
 
 
 class Resolved(NamedTuple):
@@ -62,7 +62,7 @@ class PipeString(StringModel):
         The string.
     torsional_frequency, axial_frequency : float
         Hz, up to which each motion must be right; by default 5 and 10 Hz, and where a line has
-        had ten modes if that is higher.
+        had eight modes if that is higher.
     tolerance : float
         Largest error of the reflection of a wave at the bit up to there.
 

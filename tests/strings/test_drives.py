@@ -24,6 +24,7 @@ from drillctrl import (
     spectral_abscissa,
     stiff_control,
     transfer_control,
+    weakest_slope,
     z_torque_control,
 )
 from drillctrl.strings.drill_string import Damping, DrillString
@@ -116,6 +117,22 @@ def test_critical_slopes_are_roots_of_finite_elements(name, machine):
     for slope in (0.99 * least, 1.01 * least):
         grown = 2 * sum(mode.slope < slope for mode in slopes)
         assert count_growing(line, law, slope, 1.7) == grown
+
+
+@pytest.mark.parametrize("name", ["stiff", "z-torque", "dynamic-2"])
+def test_the_weakest_of_all_modes_by_counting(name, second_order):
+    """It may be far above the first four, which the table tells."""
+    law = second_order if name == "dynamic-2" else rule_control(name, LATE, LONG)
+    weakest = weakest_slope(LONG.torsion, law)
+    assert weakest.frequency > 4.5
+    assert weakest.slope < min(mode.slope for mode in mode_slopes(LONG.torsion, law, 4))
+    counted = [count_growing(LONG.torsion, law, x * weakest.slope, 30.0) for x in (0.99, 1.01)]
+    assert counted[0] == 0
+    assert counted[1] in (2, 4)
+    assert weakest_slope(LONG.torsion, law, 3.0).frequency < 3.0
+    # What no slope sets off has none.
+    heavy = dataclasses.replace(LONG, damping=Damping(20.0, 0.1, 0.0)).torsion
+    assert weakest_slope(heavy, rule_control("z-torque", MACHINE, LONG), 3.0) is None
 
 
 @pytest.mark.parametrize("name", ["soft-torque", "soft-torque-matched", "z-torque"])
