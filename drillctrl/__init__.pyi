@@ -158,6 +158,8 @@ from .strings.drive_rules import soft_torque_control as soft_torque_control
 from .strings.drive_rules import stiff_control as stiff_control
 from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
+from .strings.drive_table import DriveTable as DriveTable
+from .strings.drive_table import drive_table as drive_table
 from .strings.drives import DriveComparison as DriveComparison
 from .strings.drives import compare_drives as compare_drives
 from .strings.drives import drive_control as drive_control

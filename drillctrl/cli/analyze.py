@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from drillctrl.cli.bit_law import bit_law_options, read_bit_law
-from drillctrl.cli.drives import are_drives, driven_case
+from drillctrl.cli.drive_law import driven_case
+from drillctrl.cli.drives import are_drives
 from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
