@@ -151,6 +151,7 @@ from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
 from .strings.drive_law import driven_plant as driven_plant
 from .strings.drive_measures import DriveMeasures as DriveMeasures
+from .strings.drive_observer import observer_drive_control as observer_drive_control
 from .strings.drive_rules import fastest_control as fastest_control
 from .strings.drive_rules import pi_control as pi_control
 from .strings.drive_rules import rule_control as rule_control

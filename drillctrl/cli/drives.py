@@ -97,7 +97,8 @@ def deliver_drive_design(
     InputError
         If an option is missing, wrong, or one that does not bear on drives.
     """
-    _refuse_others(structure, _DESIGN_BEARS)
+    dynamic = structure.startswith("dynamic-")
+    _refuse_others(structure, (*_DESIGN_BEARS, *(["depth_error"] if dynamic else [])))
     if point.get("rig") is None:
         raise InputError("--rig", "(missing)", "given: drives turn a string")
     from drillctrl.designs.drive_design import design_drive
@@ -105,7 +106,8 @@ def deliver_drive_design(
 
     drills = any(point.get(name) is not None for name in _POINT[1:])
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
-    found = design_drive(where, structure)
+    error = point.get("depth_error")
+    found = design_drive(where, structure, length_error=0.2 if error is None else error)
     deliver(found.to_dict(), found.summary, found.plot, as_json=as_json, out=out, plot=plot)
     return found.stable
 

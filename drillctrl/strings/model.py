@@ -16,10 +16,10 @@ from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.elements import Reduced, resolved
 from drillctrl.strings.lump import lumped
 
-# Hz, up to which strings are right, and the number of modes that are right in any case: what
-# cutting excites is counted in modes.
-TORSIONAL_FREQUENCY = 5.0
-AXIAL_FREQUENCY = 10.0
+# Hz, up to which strings are right, for cutting ties torsion to what it excites axially; and the
+# number of modes that are right in any case: what cutting excites is counted in modes.
+TORSIONAL_FREQUENCY = 10.0
+AXIAL_FREQUENCY = 15.0
 _FEWEST_MODES = 8
 TOLERANCE = 2e-3
 
@@ -61,7 +61,7 @@ class PipeString(StringModel):
     string : DrillString
         The string.
     torsional_frequency, axial_frequency : float
-        Hz, up to which each motion must be right; by default 5 and 10 Hz, and where a line has
+        Hz, up to which each motion must be right; by default 10 and 15 Hz, and where a line has
         had eight modes if that is higher.
     tolerance : float
         Largest error of the reflection of a wave at the bit up to there.

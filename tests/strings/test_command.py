@@ -34,6 +34,25 @@ def call(capsys):
     return run
 
 
+PIPE = """
+[bit]
+diameter = "8.5 in"
+blades = 4
+wearflat_length = "1.2 mm"
+cutter_inclination = 0.6
+friction_coefficient = 0.6
+geometry = 1.0
+
+[rock]
+strength = "60 MPa"
+contact_strength = "60 MPa"
+
+[[sections]]
+type = "pipe"
+length = "900 m"
+outer_diameter = "127 mm"
+inner_diameter = "108 mm"
+"""
 WHERE = ("--rig", "vertical-3000", "--speed", "120 rpm", "--rop", "5 m/h")
 
 
@@ -72,3 +91,24 @@ def test_what_does_not_fit_a_run_under_a_drive_is_said_in_one_line(call, argumen
     assert (code, said) == (2, "")
     assert message in error
     assert error.count("\n") == 1
+
+
+def test_shapes_of_modes(call, tmp_path):
+    """A uniform pipe alone, held above: node of the 2nd torsional mode at 2/3 of its length."""
+    path, plot = tmp_path / "pipe.toml", tmp_path / "modes.png"
+    path.write_text(PIPE)
+    point = ("--rig", path, "--speed", "180 rpm", "--rop", "1 m/h")
+    code, said, _ = call("analyze", *point, "--plot", plot, "--figure", "modes")
+    assert code == 0
+    assert "2nd torsional: still 600 m down" in said
+    assert "3rd torsional: still 360, 720 m down" in said
+    assert max(map(len, said.splitlines())) <= 80
+    assert plot.stat().st_size > 10_000
+    code, said, _ = call("analyze", *point, "--json")
+    shape = json.loads(said)["modes"][1]["shape"]
+    known = [math.sin(1.5 * math.pi * depth / 900.0) for depth in shape["depths"]]
+    sign = math.copysign(1.0, shape["amplitudes"][-1] * known[-1])
+    assert [sign * a for a in shape["amplitudes"]] == pytest.approx(known, abs=2e-3)
+    code, _, error = call("analyze", "--figure", "shapes")
+    assert code == 2
+    assert "--figure" in error

@@ -18,6 +18,7 @@ from drillctrl import (
     drive_delay_margin,
     dynamic_drive_control,
     mode_slopes,
+    observer_drive_control,
     pi_control,
     rule_control,
     soft_torque_control,
@@ -224,6 +225,34 @@ def test_second_order_by_roots_of_finite_elements(second_order):
         root = root_near(driven_string(line, second_order, mode.slope), 2j * np.pi * mode.frequency)
         assert root == pytest.approx(2j * np.pi * mode.frequency, rel=3e-4)
     assert spectral_abscissa(driven_string(line, second_order)) < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_observer_of_the_first_modes(count):
+    """It stands more than soft torque; by roots of finite elements too."""
+    line = LONG.torsion
+    law = observer_drive_control(line, LATE, count)
+    soft = rule_control("soft-torque", LATE, LONG)
+    least, known = (min(m.slope for m in mode_slopes(line, each)) for each in (law, soft))
+    assert least > (1.0, 1.0, 1.3)[count] * known
+    assert count_growing(line, law) == 0
+    assert spectral_abscissa(driven_string(line, law)) < 1e-6
+    # Estimates of angle, of modes, their rates, and the lag; and the integral of speed.
+    assert len(law.torque.poles) == 2 * (1 + count) + 1
+    assert len(law.speed.poles) == 2 * (1 + count) + 2
+    first = mode_slopes(line, law)[0]
+    root = root_near(driven_string(line, law, first.slope), 2j * np.pi * first.frequency)
+    assert root == pytest.approx(2j * np.pi * first.frequency, rel=3e-4)
+    swing, _ = law.saturating_swing(np.array([m.mode_frequency for m in mode_slopes(line, None)]))
+    assert swing >= 10 * np.pi / 30
+
+
+def test_what_an_observer_may_not_be():
+    with pytest.raises(InputError, match="modes"):
+        observer_drive_control(LONG.torsion, LATE, 4)
+    weak = dataclasses.replace(LATE, torque_limit=10.0)
+    with pytest.raises(InputError, match="observer-1"):
+        observer_drive_control(LONG.torsion, weak, 1)
 
 
 def test_a_stretched_string_is_as_much_longer():
