@@ -154,6 +154,7 @@ from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
 from .strings.drive_law import driven_plant as driven_plant
 from .strings.drive_measures import DriveMeasures as DriveMeasures
+from .strings.drive_observer import observer_drive_control as observer_drive_control
 from .strings.drive_rules import fastest_control as fastest_control
 from .strings.drive_rules import pi_control as pi_control
 from .strings.drive_rules import rule_control as rule_control
@@ -161,6 +162,8 @@ from .strings.drive_rules import soft_torque_control as soft_torque_control
 from .strings.drive_rules import stiff_control as stiff_control
 from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
+from .strings.drive_table import DriveTable as DriveTable
+from .strings.drive_table import drive_table as drive_table
 from .strings.drives import DriveComparison as DriveComparison
 from .strings.drives import compare_drives as compare_drives
 from .strings.drives import drive_control as drive_control
@@ -186,6 +189,7 @@ from .strings.slopes import count_growing as count_growing
 from .strings.slopes import critical_slopes as critical_slopes
 from .strings.slopes import drive_delay_margin as drive_delay_margin
 from .strings.slopes import mode_slopes as mode_slopes
+from .strings.slopes import weakest_slope as weakest_slope
 from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare

@@ -7,9 +7,12 @@ from typing import Any
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.bit_law import bit_law_options, read_bit_law
-from drillctrl.cli.drives import are_drives, driven_case
+from drillctrl.cli.drive_law import driven_case
+from drillctrl.cli.drives import are_drives
 from drillctrl.cli.gains import read_gains, scales_at
+from drillctrl.cli.output import write_figure
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.roots import (
     NOT_STABILISED,
@@ -26,8 +29,8 @@ from drillctrl.cli.verb import Verb
 @point_options
 @click.option(
     "--structure",
-    help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, dynamic-2 …; "
-    "without it, the open loop.",
+    help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, observer-2, "
+    "dynamic-2 …; without it, the open loop.",
 )
 @click.option(
     "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
@@ -38,6 +41,12 @@ from drillctrl.cli.verb import Verb
 @click.option("--require-stable", is_flag=True, help="Exit with 3 if it is not stable, or refused.")
 @bit_law_options
 @trials_option("none")
+@click.option(
+    "--figure",
+    default="roots",
+    show_default=True,
+    help="What --plot draws: roots, or modes (the shapes of a string of pipe).",
+)
 @root_output_options
 def analyze_command(
     structure: str | None,
@@ -50,6 +59,7 @@ def analyze_command(
     decay: str | None,
     trials: str,
     require_stable: bool,
+    figure: str,
     prove: bool,
     as_json: bool,
     out: str | None,
@@ -68,6 +78,8 @@ def analyze_command(
           --structure soft-torque
     """
     check_outputs(out, plot)
+    if figure not in ("roots", "modes"):
+        raise InputError("--figure", figure, "roots or modes")
     tried = wants_trials(trials)
     where = read_point(point)
     from drillctrl.designs.design import analyze
@@ -84,6 +96,14 @@ def analyze_command(
         assert case.plant is not None
         case = as_case(where, replace(case.plant, bit=law))
         result = analyze(case, structure, *gains, m=m, order=order, trials=tried)
+    if figure == "modes" and plot is not None:
+        from drillctrl.strings.check import check_rig
+        from drillctrl.strings.figure import plot_rig
+
+        if result.case.rig is None:
+            raise InputError("--figure", figure, "roots without --rig: a string has modes")
+        write_figure(plot, plot_rig(check_rig(result.case.rig)))
+        plot = None
     deliver_roots(result, prove, as_json, out, plot)
     if require_stable and (not result.stable or result.verdict.refused):
         raise click.exceptions.Exit(NOT_STABILISED)

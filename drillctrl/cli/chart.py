@@ -12,7 +12,8 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.axes import read_axis, with_axes
-from drillctrl.cli.drives import are_drives, driven_case
+from drillctrl.cli.drive_law import driven_case
+from drillctrl.cli.drives import are_drives
 from drillctrl.cli.gains import Scales, read_bounds, read_gains, scales_at
 from drillctrl.cli.output import (
     check_figure,

@@ -64,8 +64,8 @@ def compare_command(
     """Compare feedback structures and given gains at one point on one set of measures.
 
     Structures of a top drive (stiff, soft-torque, soft-torque-matched, soft-torque-fastest,
-    z-torque, dynamic-1 … dynamic-4) are compared on the string of a rig: reflection, critical
-    slope and threshold speed of each mode, margin of the delay.
+    z-torque, observer-1 … observer-3, dynamic-1 … dynamic-4) are compared on the string of a
+    rig: reflection, critical slope and threshold speed of each mode, margin of the delay.
 
     \b
     Examples:

@@ -10,15 +10,12 @@ import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.gains import gain_scales, read_gains
 from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
 from drillctrl.cli.point import read_point
-from drillctrl.cli.verb import naming
 
 if TYPE_CHECKING:
-    from drillctrl.drilling.bit_rock import BitRock
-    from drillctrl.drilling.case import Case
-    from drillctrl.drilling.point import OperatingPoint, RigPoint
+    from drillctrl.strings.drive_table import DriveTable
+    from drillctrl.strings.drives import DriveComparison
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -26,6 +23,7 @@ ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
 _BEARS = ("rig", "structures", "as_json", "out", *_ALONE)
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
+_TABLE_BEARS = ("rig", "depth", "structure", "require_stable", "as_json", "out", "plot")
 _DESIGN_BEARS = (*_POINT, "structure", "require_stable", "as_json", "out", "plot")
 
 
@@ -66,63 +64,6 @@ def refuse_drive_options(options: Mapping[str, Any]) -> None:
             raise InputError(f"--{name}", options[name], wanted)
 
 
-def driven_case(
-    where: OperatingPoint | RigPoint,
-    structure: str,
-    gains: tuple[str | None, str | None],
-    tried: bool,
-    bit: BitRock,
-) -> Case:
-    """Return the case of a rig that is turned by a drive under a law.
-
-    Parameters
-    ----------
-    where : RigPoint
-        Where it drills.
-    structure : str
-        The law.
-    gains : (str or None, str or None)
-        K1 of a PI law on the top's angle and speed, without it its rule's; and K2.
-    tried : bool
-        Whether trial runs are wanted.
-    bit : BitRock
-        What the bit meets.
-
-    Raises
-    ------
-    InputError
-        If there is no rig with a top drive, or an option does not fit.
-    """
-    from drillctrl.drilling.case import as_case
-    from drillctrl.drilling.plant import top_drive_plant
-    from drillctrl.drilling.point import RigPoint
-    from drillctrl.drilling.structures import soft_torque
-    from drillctrl.strings.drive_law import driven_plant
-    from drillctrl.strings.drives import drive_control, given_control, machine_of
-    from drillctrl.strings.rig import StringRig
-
-    k1, k2 = gains
-    if not isinstance(where, RigPoint):
-        raise InputError("--structure", structure, "used with --rig: it turns a string")
-    if k2 is not None:
-        raise InputError("--K2", k2, f"left out: {structure} feeds back nothing delayed")
-    if tried:
-        raise InputError("--trials", "all", "none for structures of a top drive")
-    machine_of(where.rig)
-    assert isinstance(where.rig, StringRig)
-    if k1 is None:
-        control = drive_control(structure, where.rig)
-    else:
-        scales = gain_scales(soft_torque(), top_drive_plant(1.0), where.rig)
-        with naming("--K1", "K1"):
-            read = read_gains("K1", k1, scales)
-            assert read is not None
-            assert scales is not None
-            si = [gain * scale for gain, (scale, _) in zip(read, scales, strict=False)]
-            control = given_control(structure, where.rig, si[0], si[1])
-    return as_case(where, driven_plant(where.rig, control, bit))
-
-
 def _check_options() -> None:
     """Refuse what was typed and does not bear on drives; say so of where the bit drills."""
     context = click.get_current_context()
@@ -156,13 +97,8 @@ def deliver_drive_design(
     InputError
         If an option is missing, wrong, or one that does not bear on drives.
     """
-    context = click.get_current_context()
-    for parameter in context.command.params:
-        name = parameter.name or ""
-        typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if typed and name not in _DESIGN_BEARS:
-            wanted = f"left out with --structure {structure}, a law of a top drive"
-            raise InputError(parameter.opts[0], context.params[name], wanted)
+    dynamic = structure.startswith("dynamic-")
+    _refuse_others(structure, (*_DESIGN_BEARS, *(["depth_error"] if dynamic else [])))
     if point.get("rig") is None:
         raise InputError("--rig", "(missing)", "given: drives turn a string")
     from drillctrl.designs.drive_design import design_drive
@@ -170,9 +106,64 @@ def deliver_drive_design(
 
     drills = any(point.get(name) is not None for name in _POINT[1:])
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
-    found = design_drive(where, structure)
+    error = point.get("depth_error")
+    found = design_drive(where, structure, length_error=0.2 if error is None else error)
     deliver(found.to_dict(), found.summary, found.plot, as_json=as_json, out=out, plot=plot)
     return found.stable
+
+
+def _refuse_others(structure: str, bears: Sequence[str]) -> None:
+    """Refuse what was typed and is none of the options that bear on laws of a drive."""
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if typed and name not in bears:
+            wanted = f"left out with --structure {structure}, a law of a top drive"
+            raise InputError(parameter.opts[0], context.params[name], wanted)
+
+
+def deliver_drive_table(
+    structure: str, options: Mapping[str, Any], as_json: bool, out: str | None, plot: str | None
+) -> bool:
+    """Find the law of a top drive at each depth, print, and write the files asked for.
+
+    Returns
+    -------
+    bool
+        Whether all of it is stable with a free bit.
+
+    Raises
+    ------
+    InputError
+        If an option is missing, wrong, or one that does not bear on drives.
+    """
+    _refuse_others(structure, _TABLE_BEARS)
+    if out is not None and Path(out).suffix.lower() not in ENDINGS:
+        raise InputError("--out", out, f"a file that ends in {' or '.join(ENDINGS)} for drives")
+    for name, shown in (("rig", "drives turn a string"), ("depth", "such as '1500:4500:7 m'")):
+        if options.get(name) is None:
+            raise InputError(f"--{name}", "(missing)", f"given: {shown}")
+    from drillctrl.cli.grid import read_depths
+    from drillctrl.strings.drive_table import drive_table
+    from drillctrl.strings.files import load_rig
+
+    found = drive_table(load_rig(options["rig"]), structure, read_depths(options["depth"]))
+    _write(found, out)
+    if plot is not None:
+        write_figure(plot, found.plot())
+    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+    return found.stable
+
+
+def _write(found: DriveComparison | DriveTable, out: str | None) -> None:
+    if out is None:
+        return
+    csv = Path(out).suffix.lower() == ".csv"
+    text = found.to_csv() if csv else json_text(found.to_dict()) + "\n"
+    from drillctrl.base.files import write_text
+
+    writing("--out", out, lambda: write_text(out, text))
 
 
 def deliver_drives(
@@ -218,12 +209,7 @@ def deliver_drives(
         if given[name] is not None:
             falling[name] = units.to_si(f"--{name}", given[name], dimension)
     found = compare_drives(load_rig(point["rig"]), names, FallingTorque(**falling))
-    if out is not None:
-        csv = Path(out).suffix.lower() == ".csv"
-        text = found.to_csv() if csv else json_text(found.to_dict()) + "\n"
-        from drillctrl.base.files import write_text
-
-        writing("--out", out, lambda: write_text(out, text))
+    _write(found, out)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot())
     click.echo(json_text(found.to_dict()) if as_json else found.summary())

@@ -37,6 +37,7 @@ def grid_options(command: Command) -> Command:
         click.option("--rop", metavar=with_unit, help="Such as '5:30:6 m/h'."),
         click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
         click.option("--rock-strength", metavar=with_unit, help="Such as '40:80:5 MPa'."),
+        click.option("--depth", metavar=with_unit, help="Of laws of a top drive: '1500:4500:7 m'."),
     ]
     return with_options(command, options)
 
@@ -52,6 +53,9 @@ def read_grid(options: dict[str, Any]) -> Grid:
     from drillctrl.tables.grid import dimensionless_grid
 
     given = {name: value for name, value in options.items() if value is not None}
+    if "depth" in given:
+        wanted = "left out, or given with a --structure of a top drive such as soft-torque"
+        raise InputError("--depth", given["depth"], wanted)
     groups = {k: given[k] for k in _GROUPS if k in given}
     rig = {k: given[k] for k in _RIG if k in given}
     if groups and rig:
@@ -100,6 +104,13 @@ def _rig_grid(given: dict[str, str]) -> Grid:
     for note in list(notes)[:3]:
         click.echo(f"drillctrl: note: {note}", err=True)
     return grid
+
+
+def read_depths(text: str) -> tuple[float, ...]:
+    """Return depths, m, from a text such as ``1500:4500:7 m``."""
+    from drillctrl.base import units
+
+    return _axis("depth", text, units.LENGTH).values
 
 
 def _axis(option: str, text: str, dimension: Dimension | None, name: str | None = None) -> Axis:

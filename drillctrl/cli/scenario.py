@@ -43,7 +43,11 @@ def surroundings_options(command: Command) -> Command:
 def controller_options(command: Command) -> Command:
     """Add the options that say what closes the loop."""
     options = [
-        click.option("--structure", help="p, case1, pd or case2; without it, no control."),
+        click.option(
+            "--structure",
+            help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, "
+            "dynamic-2 …; without it, no control.",
+        ),
         click.option(
             "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
         ),

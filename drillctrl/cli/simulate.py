@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.cli.drive_law import driven_run
+from drillctrl.cli.drives import are_drives
 from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
 from drillctrl.cli.output import check_figure, check_folder
 from drillctrl.cli.point import point_options, read_point, rig_name
@@ -22,6 +24,7 @@ from drillctrl.cli.scenario import (
 from drillctrl.cli.verb import Verb
 
 if TYPE_CHECKING:
+    from drillctrl.simulation.controller import Controller
     from drillctrl.simulation.result import Simulation
 
 
@@ -116,6 +119,8 @@ def simulate_command(
       drillctrl simulate --delta0 2.5 --floquet --plot portrait.png --figure phase
       drillctrl simulate --rig table1 --speed "150 rpm" --rop "20 m/h" --duration "30 s"
       drillctrl simulate --rig table1 --speed "80 rpm" --rop "20 m/h" --starts all
+      drillctrl simulate --rig vertical-3000 --speed "120 rpm" --rop "5 m/h" \\
+          --structure z-torque --measurement-delay "20 ms" --duration "2 s"
     """
     check_folder("--out", out)
     check_figure(plot)
@@ -144,7 +149,14 @@ def simulate_command(
             if given:
                 raise InputError(option, "given", "left out where there is --starts")
     scenario = read_scenario(start, initial, change, groups, rig)
-    controller = read_controller(options, where, groups, scenario, length, rig)
+    place: Any = where
+    checked: Any = groups
+    controller: Controller | None
+    if options["structure"] is not None and are_drives([options["structure"]]):
+        place, controller = driven_run(where, options)
+        checked = place
+    else:
+        controller = read_controller(options, where, groups, scenario, length, rig)
     common: dict[str, Any] = {
         "duration": length,
         "cutting": cutting,
@@ -152,25 +164,25 @@ def simulate_command(
         "rtol": rtol,
     }
     check = {**common, "scenario": scenario, "controller": controller}
-    checked_run(groups, **check, model=model)
+    checked_run(checked, **check, model=model)
     if figure in ("linear", "face") and model == "linear":
         raise InputError("--figure", figure, "motion or phase for the linear model")
     if figure == "linear":
-        checked_run(groups, **check, model="linear")
+        checked_run(checked, **check, model="linear")
     if time_limit is not None:
         common["time_limit"] = checked_number("time_limit", time_limit, 0.0, open_low=True)
-    if not is_compiled(structure_of(as_case(groups)).physics):
+    if not is_compiled(structure_of(as_case(checked)).physics):
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     if starts is not None:
-        names = read_starts(starts, possible_starts(where, model == "linear"))
+        names = read_starts(starts, possible_starts(place, model == "linear"))
         made = start_runs(
-            where, controller, starts=names, changes=scenario.changes, **common, model=model
+            place, controller, starts=names, changes=scenario.changes, **common, model=model
         )
         calm = deliver_starts(made, len(names), wanted, as_json)
     else:
 
         def again(model: str) -> Simulation:
-            return simulate(where, controller, **common, scenario=scenario, model=model)
+            return simulate(place, controller, **common, scenario=scenario, model=model)
 
         calm = deliver_run(again, model, wanted, floquet, as_json)
     if require_stable and not calm:

@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.cli.drives import are_drives, deliver_drive_table
 from drillctrl.cli.gains import gain_scales, read_bounds
 from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
@@ -33,7 +34,12 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 
 @click.command(name="table", cls=Verb)
 @grid_options
-@click.option("--structure", default="case1", show_default=True, help="p, case1, pd or case2.")
+@click.option(
+    "--structure",
+    default="case1",
+    show_default=True,
+    help="p, case1, pd or case2; or a law of a top drive, over --depth.",
+)
 @objective_options
 @click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
 @click.option(
@@ -101,11 +107,17 @@ def table_command(
       drillctrl table --omega0 8:20:5 --delta0 1:7:4 --out gains.c --period 0.01 --limit 5
       drillctrl table --rig table1 --speed "110:120:2 rpm" --rop "50 m/h" --structure pd \\
           --objective drilling --kick 0.1 --limit "0.9 kN*m"
+      drillctrl table --rig vertical-3000 --structure soft-torque --depth "2000:3000:3 m"
 
     With --out a run that was killed goes on where it was when it is started again.
     """
     check_folder("--out", out)
     check_figure(plot)
+    structure = str(options["structure"])
+    if source is None and are_drives([structure]):
+        if not deliver_drive_table(structure, options, as_json, out, plot) and require_stable:
+            raise click.exceptions.Exit(3)
+        return
     controller = {name: options.pop(name) for name in _CONTROLLER}
     if source is not None:
         _refuse_design(ctx)

@@ -14,7 +14,7 @@ from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
-from drillctrl.strings.drives import DriveComparison, compare_drives, machine_of
+from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
 from drillctrl.strings.drives_words import law_text
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
@@ -112,7 +112,11 @@ class DriveDesign:
 
 
 def design_drive(
-    where: RigPoint | Rig, structure: str, falling: FallingTorque | None = None
+    where: RigPoint | Rig,
+    structure: str,
+    falling: FallingTorque | None = None,
+    *,
+    length_error: float = 0.2,
 ) -> DriveDesign:
     """Find the law of a top drive, by the rule of its name or by optimisation.
 
@@ -125,6 +129,9 @@ def design_drive(
         rule; ``"dynamic-0"`` to ``"dynamic-4"`` are optimised.
     falling : FallingTorque, optional
         By which the bit's torque falls with its speed, for threshold speeds.
+    length_error : float
+        Share by which the string may be shorter and longer: what is optimised holds the
+        smallest critical slope of all of these up.
 
     Returns
     -------
@@ -140,7 +147,7 @@ def design_drive(
     rig = where.rig if isinstance(where, RigPoint) else where
     machine_of(rig)
     assert isinstance(rig, StringRig)
-    found = compare_drives(rig, [structure], falling)
+    found = compare_drives(rig, [drive_control(structure, rig, length_error)], falling)
     drilling = modes = None
     if isinstance(where, RigPoint):
         case = as_case(where, driven_plant(rig, found.drives[0].control))

@@ -14,8 +14,10 @@ from drillctrl.designs.design import analyze, design
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structure
+from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.pseudospectral import degree_for
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.synthesis.boundary import decide
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.reach import Reach, searched_reach
 
@@ -25,6 +27,8 @@ _STEPS = 40
 _BISECTIONS = 30
 _CONTROLLED_STEPS = 8
 _CONTROLLED_BISECTIONS = 5
+# Plants of more states are searched for what their explicit boundary says to be there alone.
+_MANY_STATES = 40
 
 _Range = tuple[float, float]
 
@@ -73,7 +77,9 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
     Tried are the presets that allow more than the structure, within the paper's bounds, the
     feed alone and beside the structure, and faster rotation at the same rate of penetration
     with the structure asked for and without feedback. Each that is returned has been designed
-    and its roots counted; that one is missing proves nothing.
+    and its roots counted; that one is missing proves nothing. Of a plant of many states, such
+    as a string of pipe, only structures of one or two gains are tried, and rotation without
+    feedback.
 
     Parameters
     ----------
@@ -89,9 +95,12 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
     if failed.stable or failed.point is None or failed.structure is None:
         return ()
     found: list[Remedy] = []
+    many = failed.plant.order > _MANY_STATES
     for kind, candidate in _candidates(failed):
         if kind == "structure" and any(remedy.kind == kind for remedy in found):
             # The presets become richer: the first that stabilises is the simplest.
+            continue
+        if many and not _stabilises(failed, candidate):
             continue
         result = design(failed.case, candidate, trials=False)
         if result.stable:
@@ -100,10 +109,16 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
     most = _FASTEST if alone is None or alone.point is None else alone.point.omega0
     if alone is not None:
         most /= failed.point.omega0
-    controlled = _controlled_speed(failed, most)
+    controlled = None if many else _controlled_speed(failed, most)
     if controlled is not None:
         found.append(Remedy("speed", failed.structure.name, controlled))
     return tuple(found) if alone is None else (*found, Remedy("speed", "none", alone))
+
+
+def _stabilises(failed: Design, candidate: FeedbackStructure) -> bool:
+    """Whether gains of a structure of one or two are known to stabilise the point."""
+    decision = decide(loop_family(failed.case.system(candidate.inputs), candidate))
+    return decision is not None and decision.possible
 
 
 def _candidates(failed: Design) -> Iterator[tuple[str, FeedbackStructure]]:
@@ -197,20 +212,22 @@ def _stable_speed(failed: Design) -> Analysis | None:
     def at(factor: float) -> OperatingPoint:
         return _faster(failed, factor)
 
-    def alpha(factor: float) -> float:
-        return spectral_abscissa(failed.case.at(at(factor)).system(()))
+    def stable_at(factor: float) -> bool:
+        system = failed.case.at(at(factor)).system(())
+        count = count_right_of(system, 0.0).count
+        return spectral_abscissa(system) < 0.0 if count is None else count == 0
 
     factors = np.geomspace(1.0, _FASTEST, _STEPS + 1).tolist()
     for low, high in itertools.pairwise(factors):
-        if alpha(high) >= 0.0:
+        if not stable_at(high):
             continue
         unstable, stable = low, high
         for _ in range(_BISECTIONS):
             middle = 0.5 * (unstable + stable)
-            unstable, stable = (unstable, middle) if alpha(middle) < 0.0 else (middle, stable)
+            unstable, stable = (unstable, middle) if stable_at(middle) else (middle, stable)
         # On the stable side of the boundary by a thousandth, if that is still stable.
         beyond = stable * (1.0 + 1e-3)
-        chosen = beyond if beyond <= high and alpha(beyond) < 0.0 else high
+        chosen = beyond if beyond <= high and stable_at(beyond) else high
         result = analyze(failed.case.at(_with_rig(failed, at(chosen), chosen)))
         return result if result.stable else None
     return None

@@ -192,7 +192,7 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
     sure = sure if line is None else line
-    reach = characteristic.magnitude_bound(system, sure)
+    reach = characteristic.tight_bound(system, sure)
     degree = degree_for_reach(reach * system.max_delay)
     while in_reach(degree):
         values = generator_eigenvalues(system, degree)
@@ -206,7 +206,7 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
                     sure = min(top, sure) - depth - 0.01 * (1.0 + abs(top))
                 else:
                     sure -= 0.5 / system.max_delay
-                reach = characteristic.magnitude_bound(system, sure)
+                reach = characteristic.tight_bound(system, sure)
                 degree = max(degree, degree_for_reach(reach * system.max_delay))
                 if not in_reach(degree):
                     return None

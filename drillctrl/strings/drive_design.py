@@ -22,7 +22,7 @@ from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
-from drillctrl.strings.slopes import drive_is_stable, lowest_impedance, mode_bands
+from drillctrl.strings.slopes import HIGHEST, drive_is_stable, lowest_impedance, mode_bands
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.search import spread_points
 
@@ -32,10 +32,12 @@ _SPEED_GAIN, _INTEGRAL, _TORQUE_GAIN = 100.0, 200.0, 30.0
 _CORNER, _DAMPING = (0.1, 30.0), (0.2, 1.5)
 # A swing of the top of 10 rpm must not take more than the torque limit.
 _SMALLEST_SWING = 10.0 * math.pi / 30.0
-# Higher modes keep this share of what they stand under a held top.
-_KEPT = 0.5
+# Higher modes count in proportion to what they stand under a held top: where the first ones reach
+# the second share of the impedance of the lowest stretch, they keep the first share of that.
+_KEPT, _AIM = 0.2, 0.15
 _LATER = 1.5
-_PER_MODE, _BEYOND = 80.0, 3.0
+# Samples up to the first mode, between modes, and of an echo from mode to mode.
+_PER_MODE, _BETWEEN, _TURN = 80.0, 40.0, 14.0
 _GROWTH = 1e-3
 # Above those frequencies up to this one in Hz: how many, and samples of the string for each.
 _HIGHEST, _FAR, _WITHIN, _ALONE = 60.0, 60, 40, 80
@@ -273,16 +275,22 @@ def stretched(line: Line, factor: float) -> Line:
 def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
     modes, ends = mode_bands(line, MODES)
     step = float(modes[0]) / _PER_MODE
-    fine = np.arange(step, ends[-1], step)
-    coarse = np.arange(ends[-1], _BEYOND * ends[-1], 2.0 * step)
-    frequencies = np.concatenate([fine, coarse])
+    # Between their poles impedances are smooth: so many samples between modes will do.
+    apart = 0.5 / line.transit_time
+    frequencies = np.concatenate(
+        [
+            np.arange(step, ends[0], step),
+            np.arange(ends[0], ends[-1], apart / _BETWEEN),
+            np.arange(ends[-1], max(HIGHEST, 2.0 * ends[-1]), 2.0 * apart / _BETWEEN),
+        ]
+    )
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     matrix, _ = line.scaled_transfer(s)
     # Under a held top, by the same samples.
     held = matrix[:, 1, 1] / (matrix[:, 0, 1] * s)
     up = np.nonzero((held.imag[:-1] < 0.0) & (held.imag[1:] >= 0.0))[0]
     stand = np.interp(frequencies, frequencies[up], held.real[up])
-    weights = np.where(frequencies <= ends[-1], 1.0, aim / np.maximum(_KEPT * stand, 1e-3 * aim))
+    weights = np.where(frequencies <= ends[-1], 1.0, aim / np.clip(_KEPT * stand, 1e-3 * aim, aim))
     pipe = line.wave_impedance
 
     def right_of(hertz: FloatArray) -> ComplexArray:
@@ -293,8 +301,10 @@ def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
         moment, angle = there[:, 1, 0], pipe * there[:, 1, 1] * at
         return np.asarray((moment - angle) / (moment + angle))
 
-    # An echo turns slowly: fewer will do.
-    near = right_of(np.concatenate([np.linspace(0.0, step, 10)[:-1], frequencies[::_FEWER]]))
+    # An echo turns once from mode to mode.
+    slow, last = frequencies[frequencies < ends[0]][::_FEWER], float(frequencies[-1])
+    turning = np.arange(ends[0], last, apart / _TURN)
+    near = right_of(np.concatenate([np.linspace(0.0, step, 10)[:-1], slow, turning, [last]]))
     edges = np.geomspace(frequencies[-1], _HIGHEST, _FAR + 1)
     within = np.linspace(edges[:-1], edges[1:], _WITHIN, axis=1)
     loudest = np.abs(echo(right_of(within.ravel()))).reshape(within.shape).max(axis=1)
@@ -342,7 +352,7 @@ def dynamic_drive_control(
     error = checked_number("length_error", length_error, 0.0, 0.5)
     modes, _ = mode_bands(line, MODES)
     rate = 2.0 * math.pi * math.sqrt(float(modes[0] * modes[-1]))
-    aim = 0.5 * lowest_impedance(line)
+    aim = _AIM * lowest_impedance(line)
     lengths = (line, *(stretched(line, 1.0 + sign * error) for sign in (-1, 1) if error))
     loops = [_loop(each, machine, aim, rate) for each in lengths]
     if machine.delay > 0.0:

@@ -117,11 +117,13 @@ class DriveLaw(Block):
             made, [signal], np.array([[0.0]]), np.array([1.0]), seen / constant,
             -inertia * made.T[turning, :] / constant,
         )  # fmt: skip
-        a, b = grown.A[:, :], grown.B[:, :]
+        a, b, e = grown.A[:, :], grown.B[:, :], grown.E[:, :]
         a[-1, -1], b[-1, column] = -1 / constant, through / constant
+        # In a string of finitely many modes a load on the bit is felt at the top at once.
+        e[-1, :] = inertia * made.E[turning, :] / constant
         row = ca.SX(1, len(grown.states))
         row[0, -1] = 1
-        return replace(grown, A=a, B=b).with_output(signal, row, ca.SX(1, 4))
+        return replace(grown, A=a, B=b, E=e).with_output(signal, row, ca.SX(1, 4))
 
 
 def _with_states(

@@ -14,7 +14,14 @@ from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_roots import DriveRoot, drive_roots
 from drillctrl.strings.falling import FallingTorque
-from drillctrl.strings.slopes import ModeSlope, drive_delay_margin, drive_is_stable, mode_slopes
+from drillctrl.strings.slopes import (
+    CriticalSlope,
+    ModeSlope,
+    drive_delay_margin,
+    drive_is_stable,
+    mode_slopes,
+    weakest_slope,
+)
 
 # Hz, that reflections are told and drawn at.
 BAND = (0.05, 5.0)
@@ -70,6 +77,9 @@ class DriveMeasures:
         Whether string and drive are, with a free bit.
     modes : tuple of DriveMode
         The first modes of torsion.
+    weakest : CriticalSlope or None
+        The smallest critical slope of all modes up to 30 Hz and where; None where no slope makes
+        any of them grow.
     delay_margin : float
         s by which the drive may act later; nan where it is unstable.
     swing : (float, float) or None
@@ -85,6 +95,7 @@ class DriveMeasures:
     control: DriveControl
     stable: bool
     modes: tuple[DriveMode, ...]
+    weakest: CriticalSlope | None
     delay_margin: float
     swing: tuple[float, float] | None
     frequencies: FloatArray
@@ -103,6 +114,11 @@ class DriveMeasures:
             "structure": self.control.name,
             "stable": self.stable,
             "smallest_critical_slope": self.smallest_slope,
+            "weakest_mode": self.weakest
+            and {
+                "critical_slope": self.weakest.slope if self.stable else 0.0,
+                "critical_frequency": self.weakest.frequency,
+            },
             "modes": [mode.to_dict() for mode in self.modes],
             "delay_margin": finite_or_none(self.delay_margin),
             "torque_limit_swing": self.swing
@@ -145,6 +161,7 @@ def measure_drive(
         control,
         drive_is_stable(line, control),
         tuple(modes),
+        weakest_slope(line, control),
         drive_delay_margin(line, control),
         control.saturating_swing(held),
         frequencies,

@@ -13,6 +13,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_design import dynamic_drive_control
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
+from drillctrl.strings.drive_observer import observer_drive_control
 from drillctrl.strings.drive_rules import RULES, pi_control, rule_control
 from drillctrl.strings.drives_words import comparison_summary
 from drillctrl.strings.falling import FallingTorque
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DYNAMIC = tuple(f"dynamic-{n}" for n in range(5))
-DRIVE_NAMES = (*RULES, *_DYNAMIC)
+_OBSERVERS = tuple(f"observer-{n}" for n in range(1, 4))
+DRIVE_NAMES = (*RULES, *_OBSERVERS, *_DYNAMIC)
 _MODES = 4
 
 
@@ -90,15 +92,18 @@ class DriveComparison:
         return plot_drives(curves, self.rig.string.torsion.wave_impedance)
 
 
-def drive_control(name: str, rig: StringRig) -> DriveControl:
+def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> DriveControl:
     """Return the law of a name for the drive of a rig, designed if it is a dynamic one.
 
     Parameters
     ----------
     name : str
-        A rule as of `rule_control`, or ``"dynamic-0"`` to ``"dynamic-4"``.
+        A rule as of `rule_control`, ``"observer-1"`` to ``"observer-3"``, or ``"dynamic-0"`` to
+        ``"dynamic-4"``.
     rig : StringRig
         With a top drive.
+    length_error : float
+        Share by which the string may be shorter and longer in the design of a dynamic law.
 
     Raises
     ------
@@ -107,7 +112,10 @@ def drive_control(name: str, rig: StringRig) -> DriveControl:
     """
     machine = machine_of(rig)
     if name in _DYNAMIC:
-        return dynamic_drive_control(rig.string.torsion, machine, int(name[-1]))
+        order = int(name[-1])
+        return dynamic_drive_control(rig.string.torsion, machine, order, length_error)
+    if name in _OBSERVERS:
+        return observer_drive_control(rig.string.torsion, machine, int(name[-1]))
     if name not in RULES:
         raise InputError("structure", name, f"one of {', '.join(DRIVE_NAMES)}")
     return rule_control(name, machine, rig.string)

@@ -11,6 +11,7 @@ from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
+from drillctrl.strings.slopes import HIGHEST
 from drillctrl.strings.words import drive_text
 
 _COLUMN = 11
@@ -34,6 +35,8 @@ def comparison_summary(
 
     by_mode("Critical slope, N·m·s", lambda drive, i: f"{drive.modes[i].slope.slope:.4g}")
     rows.append(("  smallest", [f"{drive.smallest_slope:.4g}" for drive in drives]))
+    rows.append((f"  weakest of all to {HIGHEST:g} Hz", [_weakest(drive) for drive in drives]))
+    rows.append(("    at, Hz", [_where(drive) for drive in drives]))
     by_mode("|r| of the drive", lambda drive, i: f"{drive.modes[i].reflection:.3f}")
     by_mode("Damping, % of critical", _damping)
     by_mode("Threshold speed, rpm", lambda drive, i: _speed(drive.modes[i].threshold_speed))
@@ -58,6 +61,16 @@ def comparison_summary(
         for label, cells in rows
     ]
     return "\n".join([*head, *table])
+
+
+def _weakest(drive: DriveMeasures) -> str:
+    if not drive.stable:
+        return "0"
+    return "any" if drive.weakest is None else f"{drive.weakest.slope:.4g}"
+
+
+def _where(drive: DriveMeasures) -> str:
+    return "" if drive.weakest is None else f"{drive.weakest.frequency:.3g}"
 
 
 def _damping(drive: DriveMeasures, i: int) -> str:

@@ -16,9 +16,16 @@ from drillctrl.strings.line import Line, Piece, Stretch
 # Elements of this length are 0.002 % off at this frequency in steel, in torsion.
 ELEMENT_LENGTH, ELEMENT_FREQUENCY = 20.0, 7.0
 _MOST_ELEMENTS = 20_000
-# Damping ratio of the static rest. It stands for all higher modes, which carry waves away from
-# the bit: without damping, cutting would find in it a mode that no string has, and excite it.
-_REST_DAMPING = 0.2
+# Elements that differ along a joint err with the square of their length: they are so much shorter.
+_FINER = 4.0
+# The static rest stands for all higher modes, which carry waves away from the bit: without
+# damping, cutting would find in it a mode that no string has, and excite it. An absorber tuned
+# to it, of this share of its mass, damps it by a sixth of critical and, unlike a dashpot, leaves
+# alone what is slow: its loss falls with the fifth power of frequency.
+_ABSORBER, _ABSORBER_DAMPING = 0.5, 0.5
+# Elements may take this share of a tolerance.
+_ELEMENTS_SHARE = 0.3
+_SAMPLES, _FEWER = 400, 4
 
 
 class Chain(NamedTuple):
@@ -40,11 +47,14 @@ class Chain(NamedTuple):
 
     def bit_receptance(self, s: ComplexArray) -> ComplexArray:
         """Return the displacement of the bit per force on it, under an imposed top, (...)."""
-        powers = np.array([s * s, s, np.ones_like(s)])
-        stiffness = np.tensordot(self.diagonal[:, -2], powers, 1)
-        for i in range(self.beside.shape[1] - 2, -1, -1):
-            across = np.tensordot(self.beside[:, i], powers, 1)
-            stiffness = np.tensordot(self.diagonal[:, i], powers, 1) - across**2 / stiffness
+        square = s * s
+        own, ties = self.diagonal.T.tolist(), self.beside.T.tolist()
+        m, c, k = own[-2]
+        stiffness = square * m + s * c + k
+        for i in range(len(ties) - 2, -1, -1):
+            (m, c, k), (mass, damping, spring) = own[i], ties[i]
+            across = square * mass + s * damping + spring
+            stiffness = square * m + s * c + k - across * across / stiffness
         return np.asarray(1.0 / stiffness)
 
     def product(self, which: int, shapes: FloatArray) -> FloatArray:
@@ -86,7 +96,8 @@ def _split(stretch: Stretch, element_length: float) -> list[Piece]:
     found = []
     for piece in reversed(stretch.pieces):
         whole = piece._replace(length=piece.length * (stretch.repeats if stretch.uniform else 1))
-        count = max(1, int(np.ceil(whole.length / element_length - 1e-9)))
+        longest = element_length if stretch.uniform else element_length / _FINER
+        count = max(1, int(np.ceil(whole.length / longest - 1e-9)))
         found += [whole._replace(length=whole.length / count)] * count
     return found if stretch.uniform else found * stretch.repeats
 
@@ -114,10 +125,11 @@ class Reduced(NamedTuple):
     Attributes
     ----------
     matrices : Matrices
-        Coordinates: the bit's, those of the modes, the top end's.
-    shapes : array, (N, 2 + modes)
-        Displacements of the N nodes, from the bit to the top, per coordinate.
-    top_force : array, (2 + modes,)
+        Coordinates: the bit's, those of the modes, that of the absorber, the top end's.
+    shapes : array, (N, 3 + modes)
+        Displacements of the N nodes, from the bit to the top, per coordinate; none of the
+        absorber's.
+    top_force : array, (3 + modes,)
         Force in the uppermost element per coordinate, positive where the top end is ahead.
     """
 
@@ -168,8 +180,8 @@ def reduced(chain: Chain, modes: Modes, count: int) -> Reduced:
 
     What a force on the bit moves beyond these modes is kept as a static shape (MacNeal 1971,
     Rubin 1975), what the top end moves as the static shape of the whole: so the compliance at
-    the bit is exact at low frequency and the modes are those of the elements. The static rest
-    is damped, for what it stands for takes waves away.
+    the bit is exact at low frequency and the modes are those of the elements. What the static
+    rest stands for takes waves away: an absorber (Den Hartog 1956) damps it.
 
     Parameters
     ----------
@@ -196,14 +208,40 @@ def reduced(chain: Chain, modes: Modes, count: int) -> Reduced:
     shapes[:-1, -1] = top - shapes[:-1, 0] * top[0]
     shapes[-1, -1] = 1.0
     projected = [shapes.T @ chain.product(which, shapes) for which in range(3)]
-    mass, damping, stiffness = (0.5 * (matrix + matrix.T) for matrix in projected)
-    amplitude = np.concatenate([[1.0], -kept[0], [-top[0]]])
-    own = 2.0 * _REST_DAMPING * np.sqrt(mass[0, 0] * stiffness[0, 0])
-    matrices = Matrices(mass, damping + own * np.outer(amplitude, amplitude), stiffness)
-    return Reduced(matrices, shapes, -chain.beside[2, -1] * (shapes[-1] - shapes[-2]))
+    amount = np.concatenate([[1.0], -kept[0], [-top[0]]])
+    matrices = _with_absorber([0.5 * (matrix + matrix.T) for matrix in projected], amount)
+    force = -chain.beside[2, -1] * (shapes[-1] - shapes[-2])
+    return Reduced(matrices, np.insert(shapes, -1, 0.0, axis=1), np.insert(force, -1, 0.0))
 
 
-def distance(line: Line, made: Chain | Matrices, frequency: float, count: int = 400) -> float:
+def _with_absorber(plain: list[FloatArray], amount: FloatArray) -> Matrices:
+    """Return M, C and K with a coordinate before the last that absorbs the static rest.
+
+    Parameters
+    ----------
+    plain : list of array, (k, k)
+        M, C and K; of the first coordinate they are those of the rest.
+    amount : array, (k,)
+        Of the rest, per coordinate.
+    """
+    square = plain[2][0, 0] / plain[0][0, 0]
+    mass = _ABSORBER * plain[0][0, 0]
+    rest = np.insert(amount, -1, 0.0)
+    own = np.zeros(rest.size)
+    own[-2] = 1.0
+    moved = np.outer(own, own) - np.outer(rest, rest)
+    apart = mass * np.outer(own - rest, own - rest)
+    added = (
+        # Where it moves along, it is the mass that it takes from the rest.
+        mass * moved,
+        2.0 * _ABSORBER_DAMPING * np.sqrt(square) * apart,
+        square * apart,
+    )
+    grown = [np.insert(np.insert(m, -1, 0.0, axis=0), -1, 0.0, axis=1) for m in plain]
+    return Matrices(*(one + other for one, other in zip(grown, added, strict=True)))
+
+
+def distance(line: Line, made: Chain | Matrices, frequency: float, count: int = _SAMPLES) -> float:
     """Return how far matrices are from the exact line as a wave at the bit meets them.
 
     The largest difference of the reflection coefficients (Z − ζ)/(Z + ζ), Z the impedance at
@@ -220,14 +258,24 @@ def distance(line: Line, made: Chain | Matrices, frequency: float, count: int = 
     count : int
         Number of frequencies.
     """
+    s, exact = _returned(line, frequency, count)
+    return _distance(line, made, s, exact)
+
+
+def _returned(line: Line, frequency: float, count: int) -> tuple[ComplexArray, ComplexArray]:
+    """Return s at so many frequencies, and the exact line's reflection coefficient there."""
     s = np.asarray(2j * np.pi * np.linspace(frequency / count, frequency, count), dtype=complex)
+    return s, _reflection(line, s / line.bit_stiffness(s))
+
+
+def _reflection(line: Line, mobility: ComplexArray) -> ComplexArray:
     lowest = line.stretches[-1].mean()
     impedance = np.sqrt(lowest.mass * lowest.stiffness)
-    found, exact = (
-        (1.0 - impedance * mobility) / (1.0 + impedance * mobility)
-        for mobility in (s * made.bit_receptance(s), s / line.bit_stiffness(s))
-    )
-    return float(np.abs(found - exact).max())
+    return np.asarray((1.0 - impedance * mobility) / (1.0 + impedance * mobility))
+
+
+def _distance(line: Line, made: Chain | Matrices, s: ComplexArray, exact: ComplexArray) -> float:
+    return float(np.abs(_reflection(line, s * made.bit_receptance(s)) - exact).max())
 
 
 def resolved(line: Line, frequency: float, tolerance: float) -> tuple[Reduced, float]:
@@ -248,21 +296,24 @@ def resolved(line: Line, frequency: float, tolerance: float) -> tuple[Reduced, f
         If no finite elements that are tried come so close.
     """
     length = ELEMENT_LENGTH * ELEMENT_FREQUENCY / frequency
+    s, exact = _returned(line, frequency, _SAMPLES)
     for _ in range(6):
         chain = elements(line, length)
         size = chain.diagonal.shape[1]
         if size > _MOST_ELEMENTS:
             break
-        if distance(line, chain, frequency) <= 0.7 * tolerance:
-            modes = free_modes(chain, 16)
-            count = int(np.searchsorted(modes.frequencies, frequency))
+        # What elements are off grows smoothly with frequency.
+        off = _distance(line, chain, s[::-_FEWER], exact[::-_FEWER]) / tolerance
+        if off <= _ELEMENTS_SHARE:
+            modes = free_modes(chain, 32)
+            count = int(np.searchsorted(modes.frequencies, frequency)) + 2
             while count <= size - 3:
                 if count > modes.frequencies.size:
                     modes = free_modes(chain, 2 * count)
                 found = reduced(chain, modes, count)
-                error = distance(line, found.matrices, frequency)
+                error = _distance(line, found.matrices, s, exact)
                 if error <= tolerance:
                     return found, error
                 count += 1 + count // 8
-        length /= 2.0
+        length *= min(0.5, max(0.1, 0.9 * np.sqrt(_ELEMENTS_SHARE / off)))
     raise InputError("tolerance", tolerance, f"one that elements reach up to {frequency:g} Hz")

@@ -16,9 +16,12 @@ from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.elements import Reduced, resolved
 from drillctrl.strings.lump import lumped
 
-TORSIONAL_FREQUENCY = 5.0
-AXIAL_FREQUENCY = 10.0
-TOLERANCE = 2e-2
+# Hz, up to which strings are right, for cutting ties torsion to what it excites axially; and the
+# number of modes that are right in any case: what cutting excites is counted in modes.
+TORSIONAL_FREQUENCY = 10.0
+AXIAL_FREQUENCY = 15.0
+_FEWEST_MODES = 8
+TOLERANCE = 2e-3
 
 
 class Resolved(NamedTuple):
@@ -58,7 +61,8 @@ class PipeString(StringModel):
     string : DrillString
         The string.
     torsional_frequency, axial_frequency : float
-        Hz, up to which each motion must be right.
+        Hz, up to which each motion must be right; by default 10 and 15 Hz, and where a line has
+        had eight modes if that is higher.
     tolerance : float
         Largest error of the reflection of a wave at the bit up to there.
 
@@ -76,16 +80,18 @@ class PipeString(StringModel):
     def __init__(
         self,
         string: DrillString,
-        torsional_frequency: float = TORSIONAL_FREQUENCY,
-        axial_frequency: float = AXIAL_FREQUENCY,
+        torsional_frequency: float | None = None,
+        axial_frequency: float | None = None,
         tolerance: float = TOLERANCE,
     ) -> None:
         super().__init__()
         frequencies = tuple(
-            checked_number(name, value, 0.0, 1e3, open_low=True)
-            for name, value in (
-                ("torsional_frequency", torsional_frequency),
-                ("axial_frequency", axial_frequency),
+            max(usual, 0.5 * _FEWEST_MODES / line.transit_time)
+            if value is None
+            else checked_number(name, value, 0.0, 1e3, open_low=True)
+            for name, value, usual, line in (
+                ("torsional_frequency", torsional_frequency, TORSIONAL_FREQUENCY, string.torsion),
+                ("axial_frequency", axial_frequency, AXIAL_FREQUENCY, string.tension),
             )
         )
         tolerance = checked_number("tolerance", tolerance, 1e-6, 1.0)

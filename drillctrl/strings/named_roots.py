@@ -26,6 +26,8 @@ _LOADS = ("axial", "torque")
 _PLACES, _DAMPED = 6, (0.1, 0.03, -0.01, -0.05, -0.2)
 _STEPS, _SHORT, _CONVERGED = 40, 0.1, 1e-9
 _MOST_SLOPES, _SAMPLES = 20, 100
+# Depths that a shape is given at, and modes of a kind whose nodes are told.
+_DEPTHS, _SHOWN = 51, 3
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,18 @@ class NamedRoot:
             "frequency": self.frequency,
             "damping_ratio": self.damping_ratio,
             "critical_slope": self.critical_slope,
+            "shape": self._shape(),
+        }
+
+    def _shape(self) -> dict[str, list[float]]:
+        """Return depths and amplitudes over the largest, of the mode with its top end held."""
+        mode = self.mode
+        depths = np.linspace(mode.places.min(), mode.places.max(), _DEPTHS)
+        order = np.argsort(mode.places)
+        amplitudes = np.interp(depths, mode.places[order], mode.shape[order])
+        return {
+            "depths": depths.tolist(),
+            "amplitudes": (amplitudes / np.abs(mode.shape).max()).tolist(),
         }
 
     @property
@@ -117,9 +131,27 @@ class NamedRoots:
         """Labels and texts for people."""
         named = [("Modes", "the least damped root of each, damping in % of critical")]
         named += [("", root.text) for root in self.roots]
+        named += _still(self.roots)
         if self.control is None:
             return named
         return [("Drive", self.control.name), *named]
+
+
+def _still(roots: tuple[NamedRoot, ...]) -> list[tuple[str, str]]:
+    """Return where the first modes of each kind with any nodes stand still, as metres down."""
+    told = []
+    for root in roots:
+        mode = root.mode
+        if not 2 <= mode.number <= _SHOWN:
+            continue
+        order = np.argsort(mode.places)
+        places, shape = mode.places[order], mode.shape[order]
+        # The top end itself is held.
+        at = np.flatnonzero(np.signbit(shape[1:-1]) != np.signbit(shape[2:])) + 1
+        share = shape[at] / (shape[at] - shape[at + 1])
+        depths = places[at] + share * (places[at + 1] - places[at])
+        told.append(f"{mode.name}: still {', '.join(f'{d:.0f}' for d in depths)} m down")
+    return [("Shapes" if i == 0 else "", text) for i, text in enumerate(told)]
 
 
 def turned_by(case: Case) -> DriveControl | None:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_rules import drive_poles
 from drillctrl.strings.elements import ELEMENT_LENGTH, elements, free_modes
@@ -25,6 +25,9 @@ _HALVINGS = 50
 _PER_MODE = 400.0
 # Growth, 1/s, from which a drive counts as unstable: a string that turns freely has a root at 0.
 _GROWTH = 1e-4
+# Hz up to which all modes are looked at; the first few are sampled more closely than the others,
+# which stand a mode's distance apart.
+HIGHEST, _CLOSE, _CLOSER = 30.0, 4, 5.0
 # Share of J ω that the drive's feedback still has where nothing above needs to be looked at.
 _INERTIAL = 0.1
 
@@ -117,11 +120,17 @@ def critical_slopes(
     """
     if not 0.0 < step < frequency:
         raise InputError("step", step, f"in (0, {frequency:g}) Hz")
+    return _crossings(line, control, np.arange(step, frequency + step, step))
+
+
+def _crossings(
+    line: Line, control: DriveControl | None, at: FloatArray
+) -> tuple[CriticalSlope, ...]:
+    """Return the crossings that samples at some frequencies in Hz tell of."""
 
     def impedance(f: FloatArray) -> ComplexArray:
         return bit_impedance(line, control, 2j * np.pi * f)
 
-    at = np.arange(step, frequency + step, step)
     found, rising = sign_changes(lambda f: impedance(f).imag, at)
     values = impedance(found)
     # Where the sign changes through infinity the bit is held.
@@ -182,6 +191,37 @@ def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tup
         found.append(ModeSlope(i + 1, mode, None if first is None else first.frequency, slope))
         low = high
     return tuple(found)
+
+
+def weakest_slope(
+    line: Line, control: DriveControl | None, highest: float = HIGHEST
+) -> CriticalSlope | None:
+    """Return the smallest critical slope of all modes of torsion up to a frequency.
+
+    A law that does much for the first modes may do harm to a higher one.
+
+    Parameters
+    ----------
+    line : Line
+        The string in torsion.
+    control : DriveControl or None
+        Of the drive; None for an imposed speed.
+    highest : float
+        Hz.
+
+    Returns
+    -------
+    CriticalSlope or None
+        None where no slope below the impedance of the lowest stretch makes any of them grow.
+    """
+    checked_number("highest", highest, 0.0, 1e3, open_low=True)
+    modes, ends = mode_bands(line, _CLOSE)
+    step = float(modes[0]) / _PER_MODE
+    most, near = lowest_impedance(line), min(float(ends[-1]), highest)
+    at = np.concatenate([np.arange(step, near, step), np.arange(near, highest, _CLOSER * step)])
+    crossings = _crossings(line, control, np.append(at, highest))
+    grown = [c for c in crossings if c.grows and 0.0 < c.slope < most]
+    return min(grown, key=lambda c: c.slope, default=None)
 
 
 def count_growing(

@@ -4,8 +4,17 @@ import json
 
 import pytest
 
-from drillctrl import cli, compare_drives, design_drive, string_preset
+from drillctrl import (
+    DriveControl,
+    Transfer,
+    cli,
+    compare_drives,
+    design_drive,
+    mode_slopes,
+    string_preset,
+)
 from drillctrl.drilling.point import RigPoint
+from drillctrl.strings.drive_design import stretched
 
 RIG = "vertical-3000"
 
@@ -43,12 +52,33 @@ def test_at_a_point_the_rock_is_in_it(capsys):
     assert found.to_dict()["drilling"]["structure"] == "soft-torque"
 
 
+def test_the_design_holds_for_strings_as_much_shorter_and_longer(capsys):
+    """Prepared for others, it stands more on the worst of them, and hardly less on its own."""
+    string = string_preset(RIG).string.torsion
+    least = []
+    for error in ("0.0", "0.3"):
+        arguments = ("--structure", "dynamic-0", "--depth-error", error, "--json")
+        code, out, _ = run(capsys, "design", "--rig", RIG, *arguments)
+        assert code == 0
+        law = json.loads(out)["law"]
+        sides = [Transfer(**law[side]) for side in ("speed", "torque")]
+        control = DriveControl("found", string_preset(RIG).drive, *sides)
+        lines = [stretched(string, factor) for factor in (0.7, 1.0, 1.3)]
+        least.append([min(m.slope for m in mode_slopes(line, control)) for line in lines])
+    assert least[0] != least[1]
+    assert least[0][1] >= 0.95 * least[1][1]
+    assert min(least[1]) >= min(least[0])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("--rig", RIG, "--structure", "z-torque", "--bound", "K1=-1:1"), "--bound"),
         (("--rig", "paper-string", "--structure", "stiff"), "with a [top_drive]"),
         (("--structure", "stiff"), "--rig = (missing)"),
+        (("--rig", RIG, "--structure", "stiff", "--depth-error", "0.1"), "--depth-error"),
+        (("--rig", RIG, "--structure", "dynamic-1", "--depth-error", "0.9"), "length_error"),
+        (("--structure", "p", "--depth-error", "0.1"), "--depth-error"),
         (("--rig", RIG, "--structure", "dynamic-9"), "dynamic-9"),
         (("--rig", RIG, "--speed", "9 rpm", "--rop", "1 m/h", "--structure", "p"), "free to turn"),
     ],

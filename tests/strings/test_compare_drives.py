@@ -106,6 +106,7 @@ def test_table_and_fields(run, tmp_path):
         assert all(mode["damping_ratio"] > 0.003 for mode in drive["modes"])
         # Torque 2 kN m exp(−Ω/5): its slope at the threshold is the critical one.
         for mode in drive["modes"]:
+            assert drive["weakest_mode"]["critical_slope"] <= mode["critical_slope"]
             slope = 400.0 * math.exp(-mode["threshold_speed"] / 5.0)
             assert slope == pytest.approx(mode["critical_slope"], rel=1e-9)
     at = np.interp(0.25, *(stiff["reflection"][n] for n in ("frequencies", "magnitudes")))
@@ -122,6 +123,7 @@ def test_a_table_for_people(run):
     assert "1st torsional, 0.250 Hz" in said
     assert "falls by 4 kN·m over 60 rpm" in said
     assert "23.81" in said
+    assert "weakest of all to 30 Hz" in said
 
 
 @pytest.mark.parametrize(

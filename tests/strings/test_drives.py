@@ -18,12 +18,14 @@ from drillctrl import (
     drive_delay_margin,
     dynamic_drive_control,
     mode_slopes,
+    observer_drive_control,
     pi_control,
     rule_control,
     soft_torque_control,
     spectral_abscissa,
     stiff_control,
     transfer_control,
+    weakest_slope,
     z_torque_control,
 )
 from drillctrl.strings.drill_string import Damping, DrillString
@@ -118,6 +120,22 @@ def test_critical_slopes_are_roots_of_finite_elements(name, machine):
         assert count_growing(line, law, slope, 1.7) == grown
 
 
+@pytest.mark.parametrize("name", ["stiff", "z-torque", "dynamic-2"])
+def test_the_weakest_of_all_modes_by_counting(name, second_order):
+    """It may be far above the first four, which the table tells."""
+    law = second_order if name == "dynamic-2" else rule_control(name, LATE, LONG)
+    weakest = weakest_slope(LONG.torsion, law)
+    assert weakest.frequency > 4.5
+    assert weakest.slope < min(mode.slope for mode in mode_slopes(LONG.torsion, law, 4))
+    counted = [count_growing(LONG.torsion, law, x * weakest.slope, 30.0) for x in (0.99, 1.01)]
+    assert counted[0] == 0
+    assert counted[1] in (2, 4)
+    assert weakest_slope(LONG.torsion, law, 3.0).frequency < 3.0
+    # What no slope sets off has none.
+    heavy = dataclasses.replace(LONG, damping=Damping(20.0, 0.1, 0.0)).torsion
+    assert weakest_slope(heavy, rule_control("z-torque", MACHINE, LONG), 3.0) is None
+
+
 @pytest.mark.parametrize("name", ["soft-torque", "soft-torque-matched", "z-torque"])
 def test_margin_of_the_delay_by_roots_of_finite_elements(name):
     string = long_string(1500.0, 2e-4)
@@ -207,6 +225,34 @@ def test_second_order_by_roots_of_finite_elements(second_order):
         root = root_near(driven_string(line, second_order, mode.slope), 2j * np.pi * mode.frequency)
         assert root == pytest.approx(2j * np.pi * mode.frequency, rel=3e-4)
     assert spectral_abscissa(driven_string(line, second_order)) < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_observer_of_the_first_modes(count):
+    """It stands more than soft torque; by roots of finite elements too."""
+    line = LONG.torsion
+    law = observer_drive_control(line, LATE, count)
+    soft = rule_control("soft-torque", LATE, LONG)
+    least, known = (min(m.slope for m in mode_slopes(line, each)) for each in (law, soft))
+    assert least > (1.0, 1.0, 1.3)[count] * known
+    assert count_growing(line, law) == 0
+    assert spectral_abscissa(driven_string(line, law)) < 1e-6
+    # Estimates of angle, of modes, their rates, and the lag; and the integral of speed.
+    assert len(law.torque.poles) == 2 * (1 + count) + 1
+    assert len(law.speed.poles) == 2 * (1 + count) + 2
+    first = mode_slopes(line, law)[0]
+    root = root_near(driven_string(line, law, first.slope), 2j * np.pi * first.frequency)
+    assert root == pytest.approx(2j * np.pi * first.frequency, rel=3e-4)
+    swing, _ = law.saturating_swing(np.array([m.mode_frequency for m in mode_slopes(line, None)]))
+    assert swing >= 10 * np.pi / 30
+
+
+def test_what_an_observer_may_not_be():
+    with pytest.raises(InputError, match="modes"):
+        observer_drive_control(LONG.torsion, LATE, 4)
+    weak = dataclasses.replace(LATE, torque_limit=10.0)
+    with pytest.raises(InputError, match="observer-1"):
+        observer_drive_control(LONG.torsion, weak, 1)
 
 
 def test_a_stretched_string_is_as_much_longer():

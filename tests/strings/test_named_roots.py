@@ -26,7 +26,7 @@ from drillctrl import (
     preset_structure,
     string_preset,
 )
-from drillctrl.cli.drives import driven_case
+from drillctrl.cli.drive_law import driven_case
 from drillctrl.spectrum import characteristic
 from drillctrl.strings.drive_law import companion, driven_plant, without_integral
 from drillctrl.strings.drive_roots import drive_roots

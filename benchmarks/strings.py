@@ -1,0 +1,72 @@
+"""Reduced and exact strings against each other at random, and what designed drives stand.
+
+``python -m benchmarks.strings [COUNT]`` counts growing roots of COUNT random strings, drives and
+points on both routes, compares the roots, and measures a fixed-order law on strings of 2500 m.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from drillctrl import (
+    characteristic_roots,
+    count_growing,
+    count_right_of,
+    dynamic_drive_control,
+    exact_loop,
+    mode_slopes,
+    rule_control,
+    weakest_slope,
+)
+from tests.strings.test_counts import random_case
+from tests.strings.test_drives import LATE, LONG, long_string
+
+# How many of the cases have their roots compared, too.
+_COMPARED = 0.1
+
+
+def counts(number: int) -> None:
+    """Say how many counts agree, and how far roots up to 10 Hz are apart."""
+    rng = np.random.default_rng(2026)
+    agree, worst, began = 0, 0.0, time.perf_counter()
+    for i in range(number):
+        case = random_case(rng)
+        system, loop = case.system(), exact_loop(case)
+        reduced, exact = count_right_of(system, 0.0).count, loop.count_right_of(0.0)
+        agree += reduced == exact
+        if reduced != exact:
+            print(f"case {i}: {reduced} reduced, {exact} exact", flush=True)
+        if i < _COMPARED * number:
+            for root in characteristic_roots(system, -0.3):
+                if abs(root.value) * loop.rate < 20.0 * np.pi:
+                    off = abs(loop.root(root.value) - root.value)
+                    worst = max(worst, off / max(abs(root.value), 1.0))
+    elapsed = time.perf_counter() - began
+    print(f"{agree} of {number} counts agree, roots within {worst:.2g}, {elapsed:.0f} s")
+
+
+def fixed_order() -> None:
+    """Say what a law of second order stands over lengths of ±20 %, beside soft torque."""
+    began = time.perf_counter()
+    law = dynamic_drive_control(LONG.torsion, LATE, 2)
+    elapsed = time.perf_counter() - began
+    soft = rule_control("soft-torque", LATE, LONG)
+    known = min(mode.slope for mode in mode_slopes(LONG.torsion, soft))
+    print(f"soft torque stands {known:.1f} N m s; designed in {elapsed:.1f} s:")
+    for length in np.linspace(2000.0, 3000.0, 11):
+        line = long_string(length).torsion
+        least = min(mode.slope for mode in mode_slopes(line, law))
+        weakest = weakest_slope(line, law)
+        high = "any" if weakest is None else f"{weakest.slope:.2f} at {weakest.frequency:.2f} Hz"
+        print(
+            f"{length:.0f} m: {least:.1f} ({least / known:.2f} times), weakest of all {high}, "
+            f"{count_growing(line, law)} growing"
+        )
+
+
+if __name__ == "__main__":
+    fixed_order()
+    counts(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)

@@ -1,0 +1,193 @@
+"""Laws of a top drive over depth: what to set as pipe is added, and what it stands in between."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillctrl.base.errors import InputError
+from drillctrl.base.figure import BLUE, GREY, ORANGE, new_figure
+from drillctrl.base.tableio import csv_text
+from drillctrl.base.text import finite_or_none
+from drillctrl.drilling.rig import Rig
+from drillctrl.strings.changed import changed_rig
+from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
+from drillctrl.strings.drives import drive_control, machine_of
+from drillctrl.strings.drives_words import law_text
+from drillctrl.strings.falling import FallingTorque
+from drillctrl.strings.line import Line
+from drillctrl.strings.slopes import drive_is_stable, lowest_impedance, weakest_slope
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MODES, _MOST = 4, 200
+
+
+@dataclass(frozen=True, eq=False)
+class DriveTable:
+    """The law of a drive at several depths.
+
+    Attributes
+    ----------
+    rig : StringRig
+        At the depth that it was given.
+    structure : str
+        As of `drive_control`.
+    depths : tuple of float
+        Lengths of the string, m, rising.
+    drives : tuple of DriveMeasures
+        One a depth.
+    between : tuple of float
+        Weakest slope halfway to the next depth, under the worse of the laws on both sides,
+        N m s/rad; one less than depths. Laws are held to there.
+    elapsed_seconds : float
+        Wall time.
+    """
+
+    rig: Rig
+    structure: str
+    depths: tuple[float, ...]
+    drives: tuple[DriveMeasures, ...]
+    between: tuple[float, ...]
+    elapsed_seconds: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether string and drive are, with a free bit, at and between all depths."""
+        return all(drive.stable for drive in self.drives) and min(self.between, default=1.0) > 0.0
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for depth, drive, after in zip(
+            self.depths, self.drives, (*self.between, None), strict=True
+        ):
+            weakest = drive.weakest
+            rows.append(
+                {
+                    "depth": depth,
+                    "stable": drive.stable,
+                    "smallest_critical_slope": drive.smallest_slope,
+                    "weakest_slope": weakest and (weakest.slope if drive.stable else 0.0),
+                    "weakest_frequency": weakest and weakest.frequency,
+                    "weakest_slope_after": after,
+                    "delay_margin": finite_or_none(drive.delay_margin),
+                    "first_frequency": drive.modes[0].slope.mode_frequency,
+                }
+            )
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON fields of the command line."""
+        laws = [drive.control.to_dict() for drive in self.drives]
+        return {
+            "schema": "drillctrl/drive-table/1",
+            "structure": self.structure,
+            "top_drive": asdict(self.drives[0].control.machine),
+            "stable": self.stable,
+            "nodes": [{**row, "law": law} for row, law in zip(self._rows(), laws, strict=True)],
+            "elapsed_seconds": self.elapsed_seconds,
+        }
+
+    def to_csv(self) -> str:
+        """Return a row for each depth, coefficients of s in 1/s from the highest power on."""
+        rows = self._rows()
+        for row, drive in zip(rows, self.drives, strict=True):
+            for side, law in drive.control.to_dict().items():
+                for part, values in law.items():
+                    row[f"{side}_{part}"] = " ".join(map(repr, values))
+        return csv_text(list(rows[0]), (list(row.values()) for row in rows))
+
+    def summary(self) -> str:
+        """Return a table for people."""
+        lines = [
+            f"Top drive under {self.structure} over the depth of its string",
+            "depth, m   first mode, Hz   critical slope, N·m·s   of all to 30 Hz   margin, ms",
+        ]
+        for row in self._rows():
+            margin = row["delay_margin"]
+            weakest = row["weakest_slope"]
+            lines.append(
+                f"{row['depth']:8.6g}{row['first_frequency']:17.4f}"
+                f"{row['smallest_critical_slope']:24.4g}"
+                f"{'any' if weakest is None else f'{weakest:.4g}':>18}"
+                f"{'none' if margin is None else f'{1e3 * margin:.3g}':>13}"
+            )
+        lines += [f"{depth:8.6g} m: {law_text(drive.control)}" for depth, drive in self._laws()]
+        if self.between:
+            lines.append(
+                f"Held to the middle between depths, laws stand {min(self.between):.4g} N·m·s there"
+            )
+        lines.append("Stable with a free bit" if self.stable else "NOT stable with a free bit")
+        return "\n".join(lines)
+
+    def _laws(self) -> list[tuple[float, DriveMeasures]]:
+        return list(zip(self.depths, self.drives, strict=True))
+
+    def plot(self) -> Figure:
+        """Draw what the laws stand over depth."""
+        figure = new_figure(6.0, 4.0)
+        ax = figure.subplots()
+        rows = self._rows()
+        ceiling = lowest_impedance(self.rig.string.torsion)  # type: ignore[attr-defined]
+        four = [row["smallest_critical_slope"] for row in rows]
+        every = [ceiling if row["weakest_slope"] is None else row["weakest_slope"] for row in rows]
+        ax.plot(self.depths, four, "o-", color=BLUE, label="first four modes")
+        ax.plot(self.depths, every, "s--", ms=4, color=ORANGE, label="all modes to 30 Hz")
+        if self.between:
+            middles = 0.5 * (np.array(self.depths[1:]) + np.array(self.depths[:-1]))
+            ax.plot(middles, self.between, "x", color=GREY, label="all modes, law held to there")
+        ax.set_xlabel("length of the string, m")
+        ax.set_ylabel("critical slope, N·m·s/rad")
+        ax.set_ylim(bottom=0.0)
+        ax.legend(fontsize=8)
+        return figure
+
+
+def drive_table(rig: Rig, structure: str, depths: Sequence[float]) -> DriveTable:
+    """Tune or design the law of a top drive at several depths.
+
+    Parameters
+    ----------
+    rig : StringRig
+        With a top drive; its pipe is added or taken away at the top.
+    structure : str
+        As of `drive_control`.
+    depths : sequence of float
+        Lengths of the string, m, rising.
+
+    Raises
+    ------
+    InputError
+        If the rig has no top drive, there is no such structure, or a depth is out of range.
+    """
+    began = time.perf_counter()
+    machine_of(rig)
+    if not 1 <= len(depths) <= _MOST or any(b <= a for a, b in itertools.pairwise(depths)):
+        raise InputError("depth", list(depths)[:4], f"one to {_MOST} values, rising")
+    rigs = [changed_rig(rig, depth=depth) for depth in depths]
+    falling = FallingTorque()
+    controls = [drive_control(structure, each) for each in rigs]
+    drives = tuple(
+        measure_drive(each.string, control, falling, _MODES)
+        for each, control in zip(rigs, controls, strict=True)
+    )
+    between = []
+    for i in range(len(rigs) - 1):
+        line = changed_rig(rig, depth=0.5 * (depths[i] + depths[i + 1])).string.torsion
+        between.append(min(_stands(line, control) for control in controls[i : i + 2]))
+    elapsed = time.perf_counter() - began
+    return DriveTable(rig, structure, tuple(depths), drives, tuple(between), elapsed)
+
+
+def _stands(line: Line, control: DriveControl) -> float:
+    if not drive_is_stable(line, control):
+        return 0.0
+    found = weakest_slope(line, control)
+    return lowest_impedance(line) if found is None else found.slope
