@@ -195,16 +195,26 @@ class LinearArrays(NamedTuple):
         return not self.late and not self.input_delays.any()
 
 
+@by_form
+def _stacked(plant: Plant) -> tuple[ca.Function, tuple[tuple[int, int], ...]]:
+    """Return `linearisation` with all outputs in one column, and their shapes."""
+    form, function = expressions(plant), linearisation(plant)
+    column = ca.vertcat(*[ca.vec(ca.transpose(part)) for part in function(form.parameters)])
+    shapes = tuple(function.size_out(i) for i in range(function.n_out()))
+    return ca.Function("stacked", [form.parameters], [column]), shapes
+
+
 def linear_arrays(plant: Plant, table: FloatArray) -> LinearArrays:
     """Return the linear plants at rows of parameters, (N, k)."""
     count = table.shape[0]
-    function = linearisation(plant)
+    function, shapes = _stacked(plant)
     mapped = function if count == 1 else function.map(count)
-    values = []
-    for i, value in enumerate(mapped(table.T)):
-        rows, columns = function.size_out(i)
-        full = value.full().reshape(rows, count, columns)
-        values.append(np.ascontiguousarray(full.transpose(1, 0, 2)))
+    column = np.ascontiguousarray(mapped(table.T).full().T)
+    values, start = [], 0
+    for rows, columns in shapes:
+        stop = start + rows * columns
+        values.append(column[:, start:stop].reshape(count, rows, columns))
+        start = stop
     late = tuple((values[i].reshape(count), values[i + 1]) for i in range(7, len(values), 2))
     a0, left, right, b, c, tau, inputs = values[:7]
     delays = inputs.reshape(count, -1)
