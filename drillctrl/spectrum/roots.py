@@ -426,9 +426,9 @@ def _total(roots: tuple[Root, ...]) -> int:
 
 def _weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
     """S(s) = ‖A0‖ + Σ ‖Ai‖ |exp(−sτi)|, what relative changes are measured against."""
-    total = np.full(s.shape, float(np.linalg.norm(system.A0, 2)))
-    for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        total += np.linalg.norm(delayed, 2) * np.exp(np.minimum(-s.real * delay, 300.0))
+    total = np.full(s.shape, system.norms[0])
+    for delay, size in zip(system.delays, system.norms[1:], strict=True):
+        total += size * np.exp(np.minimum(-s.real * delay, 300.0))
     return np.asarray(np.maximum(total, 1e-300))
 
 
