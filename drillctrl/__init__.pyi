@@ -131,8 +131,8 @@ from .simulation.starts import StartRun as StartRun
 from .simulation.starts import StartSet as StartSet
 from .simulation.starts import simulate_starts as simulate_starts
 from .spectrum.count import count_right_of as count_right_of
+from .spectrum.multiplicity import Root as Root
 from .spectrum.proof import prove_count as prove_count
-from .spectrum.roots import Root as Root
 from .spectrum.roots import characteristic_roots as characteristic_roots
 from .spectrum.roots import dominant_roots as dominant_roots
 from .spectrum.roots import spectral_abscissa as spectral_abscissa
@@ -204,11 +204,11 @@ from .synthesis.objectives import Robust as Robust
 from .synthesis.objectives import SemiDiscrete as SemiDiscrete
 from .tables.files import load_table as load_table
 from .tables.files import save_table as save_table
+from .tables.gain_table import GainTable as GainTable
 from .tables.grid import Axis as Axis
 from .tables.grid import Grid as Grid
 from .tables.grid import dimensionless_grid as dimensionless_grid
 from .tables.grid import linear_axis as linear_axis
 from .tables.grid import rig_grid as rig_grid
 from .tables.scheduling import scheduled as scheduled
-from .tables.table import GainTable as GainTable
 from .tables.table import table as table

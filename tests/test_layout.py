@@ -23,7 +23,7 @@ RESULTS = (
         "charts.volume",
     ),
     *(
-        "tables.table",
+        "tables.gain_table",
         "simulation.result",
         "motion.swing",
         "studies.campaign",

@@ -78,15 +78,11 @@ def checked_number(
     InputError
         If ``value`` is not a finite real number in the interval.
     """
-    permitted = interval_text(low, high, open_low=open_low)
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise InputError(parameter, value, permitted)
-    number = float(value)
-    if not math.isfinite(number) or number < low or number > high:
-        raise InputError(parameter, number, permitted)
-    if open_low and number == low:
-        raise InputError(parameter, number, permitted)
-    return number
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        value = number = float(value)
+        if low <= number <= high and math.isfinite(number) and not (open_low and number == low):
+            return number
+    raise InputError(parameter, value, interval_text(low, high, open_low=open_low))
 
 
 def checked_integer(parameter: str, value: object, low: int, high: int) -> int:

@@ -67,7 +67,7 @@ def stable_curves(lines: tuple[ScanLine, ...], *, rows: bool) -> list[Curve]:
     list of Curve
         Edges of the chart itself are left out.
     """
-    intervals = [line.stable_intervals() for line in lines]
+    intervals = [line.stable_intervals for line in lines]
     links: dict[Node, list[Node]] = {}
 
     def real(node: Node) -> bool:
@@ -127,7 +127,7 @@ def stable_strips(lines: Sequence[ScanLine], *, rows: bool) -> list[FloatArray]:
     list of array, (4, 2)
     """
     polygons = []
-    intervals = [line.stable_intervals() for line in lines]
+    intervals = [line.stable_intervals for line in lines]
     for i in range(len(lines) - 1):
         t0, t1 = lines[i].position, lines[i + 1].position
         for left, right in _groups(intervals[i], intervals[i + 1]):

@@ -6,6 +6,7 @@ axis (or on another vertical line), and by a known amount.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -52,8 +53,9 @@ class ScanLine:
     decided_from: float
     listed_from: float
 
+    @functools.cached_property
     def stable_intervals(self) -> list[tuple[float, float, float, float]]:
-        """Return (start, end, ω at start, ω at end) of each stable stretch.
+        """(start, end, ω at start, ω at end) of each stable stretch.
 
         ω is NaN at an end of the line.
         """

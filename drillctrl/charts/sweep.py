@@ -41,12 +41,12 @@ class Sweep:
 
 
 def _length(line: ScanLine) -> float:
-    return sum(stop - start for start, stop, _, _ in line.stable_intervals())
+    return sum(stop - start for start, stop, _, _ in line.stable_intervals)
 
 
 def _alike(first: ScanLine, second: ScanLine) -> bool:
     """Whether the stable sets of two lines are bounded by the same branches."""
-    one, two = first.stable_intervals(), second.stable_intervals()
+    one, two = first.stable_intervals, second.stable_intervals
     if len(one) != len(two):
         return False
     for a, b in zip(one, two, strict=True):

@@ -96,7 +96,7 @@ class StabilityVolume:
         """
         corners: list[tuple[float, float, float]] = []
         known: dict[tuple[int, int, int], int] = {}
-        stretches = [[line.stable_intervals() for line in lines] for lines in self.lines]
+        stretches = [[line.stable_intervals for line in lines] for lines in self.lines]
 
         def corner(k: int, j: int, end: int) -> int:
             if (k, j, end) not in known:
@@ -207,7 +207,7 @@ def _area(lines: Sequence[ScanLine], stride: int) -> float:
     chosen = [*lines[::stride]]
     if chosen[-1] is not lines[-1]:
         chosen.append(lines[-1])
-    lengths = [sum(b - a for a, b, *_ in line.stable_intervals()) for line in chosen]
+    lengths = [sum(b - a for a, b, *_ in line.stable_intervals) for line in chosen]
     return float(np.trapezoid(lengths, [line.position for line in chosen]))
 
 

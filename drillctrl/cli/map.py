@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.simulation.controller import Controller
-    from drillctrl.tables.table import GainTable
+    from drillctrl.tables.gain_table import GainTable
 
 _RIG_AXES = ("speed=50:180 rpm", "rop=5:50 m/h")
 _AXES = ("omega0=4:24", "delta0=0.5:12")

@@ -23,8 +23,8 @@ from drillctrl.cli.verb import Verb, naming
 if TYPE_CHECKING:
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.delay.structure import FeedbackStructure
+    from drillctrl.tables.gain_table import GainTable
     from drillctrl.tables.grid import Grid
-    from drillctrl.tables.table import GainTable
 
 CONTROLLERS = (".c", ".st")
 # What may go with a table that is there already.

@@ -74,7 +74,7 @@ def close_loop(
     DelaySystem
         The same states, inputs and outputs; u is what is added to the feedback.
     """
-    gains = np.stack(gain_matrices(feedback, K1, K2))
+    gains = np.array(gain_matrices(feedback, K1, K2))
     return with_terms(
         system, *loop_channels(system, feedback), gains, feedback_lags(system, feedback, delay)
     )
@@ -96,9 +96,8 @@ def with_terms(
     """
     matrices = {0.0: system.A0, **dict(zip(system.delays, system.delayed, strict=True))}
     for lag in set(lags[gains != 0.0].tolist()):
-        part = np.where(lags == lag, gains, 0.0).sum(axis=0)
-        matrices[lag] = system.delayed_matrix(lag) if lag else system.A0
-        matrices[lag] = matrices[lag] + drive @ part @ measure
+        term = drive @ ((lags == lag) * gains).sum(axis=0) @ measure
+        matrices[lag] = matrices[lag] + term if lag in matrices else term
     delays = tuple(sorted(matrices))[1:]
     return replace(
         system,

@@ -229,7 +229,7 @@ def _small_determinant(
     return value, ratio
 
 
-def reduced(system: DelaySystem, *, plain: bool = False) -> ReducedLoops:
+def reduced(system: DelaySystem) -> ReducedLoops:
     """Return a single system as the one loop of a family; see `reduced_loops`.
 
     Its states are scaled first, so that the units in which they are given do not matter.
@@ -244,7 +244,6 @@ def reduced(system: DelaySystem, *, plain: bool = False) -> ReducedLoops:
         np.hstack(left)[None],
         np.vstack(right)[None],
         np.concatenate([np.zeros(0), *delays])[None],
-        plain=plain,
     )
 
 

@@ -21,11 +21,13 @@ def _matrix(name: str, value: npt.ArrayLike, shape: tuple[int | None, int | None
         matrix = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(name, type(value).__name__, "a matrix of numbers") from None
-    wanted = tuple("any" if size is None else str(size) for size in shape)
-    fits = matrix.ndim == 2 and all(
-        want is None or want == have for want, have in zip(shape, matrix.shape, strict=True)
-    )
-    if not fits:
+    rows, columns = shape
+    if (
+        matrix.ndim != 2
+        or rows not in (None, matrix.shape[0])
+        or columns not in (None, matrix.shape[1])
+    ):
+        wanted = ("any" if size is None else str(size) for size in shape)
         raise InputError(name, f"array of shape {matrix.shape}", f"of shape ({', '.join(wanted)})")
     if not np.isfinite(matrix).all():
         raise InputError(name, "an array with NaN or infinity", "finite")
@@ -154,6 +156,11 @@ class DelaySystem:
         """
         return tuple(low_rank_factors(matrix) for matrix in self.delayed)
 
+    @functools.cached_property
+    def norms(self) -> tuple[float, ...]:
+        """Spectral norms of A0 and of each Ai."""
+        return tuple(float(np.linalg.norm(part, 2)) for part in (self.A0, *self.delayed))
+
     def scaled_time(self, unit: float) -> DelaySystem:
         """Return the same system with time counted in ``unit`` old units.
 
@@ -176,8 +183,8 @@ class DelaySystem:
 
         It is the system itself where that is so already. Inputs, outputs and roots stay.
         """
-        total = self._size()
-        rows, columns = total.sum(axis=1), total.sum(axis=0)
+        size = self._size()
+        rows, columns = size.sum(axis=1), size.sum(axis=0)
         if (rows <= _UNBALANCED * columns).all() and (columns <= _UNBALANCED * rows).all():
             return self
         return self.rescaled()
@@ -221,6 +228,7 @@ def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     kept = np.sort(rows[order[:rank]])
     right = matrix[kept]
     left = np.zeros((matrix.shape[0], rank))
-    left[rows] = scipy.linalg.lstsq(right.T, matrix[rows].T)[0].T
+    if rank < rows.size:
+        left[rows] = scipy.linalg.lstsq(right.T, matrix[rows].T)[0].T
     left[kept] = np.eye(rank)
     return left, right

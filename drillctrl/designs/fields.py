@@ -13,7 +13,7 @@ from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import steady_state
-from drillctrl.spectrum.roots import Root
+from drillctrl.spectrum.multiplicity import Root
 
 
 def result_fields(result: AnalysisValues) -> dict[str, Any]:

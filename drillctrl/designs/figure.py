@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from drillctrl.delay.system import DelaySystem
     from drillctrl.drilling.rig import Rig
-    from drillctrl.spectrum.roots import Root
+    from drillctrl.spectrum.multiplicity import Root
 
 
 def plot_roots(

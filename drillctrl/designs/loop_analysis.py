@@ -9,7 +9,8 @@ import numpy as np
 
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.count import count_right_of
-from drillctrl.spectrum.roots import Root, known_roots
+from drillctrl.spectrum.multiplicity import Root
+from drillctrl.spectrum.roots import known_roots
 from drillctrl.spectrum.semidiscretization import semidiscretize
 
 DEFAULT_ORDER = 2

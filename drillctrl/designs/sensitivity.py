@@ -12,7 +12,8 @@ from drillctrl.delay.closing import close_loop, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.linear import linearisation_sensitivity
-from drillctrl.spectrum.roots import Root, dominant_roots
+from drillctrl.spectrum.multiplicity import Root
+from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.spectrum.sensitivity import matrix_sensitivity
 
 

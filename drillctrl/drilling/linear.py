@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.drilling.bit_rock import (
@@ -17,7 +16,14 @@ from drillctrl.drilling.bit_rock import (
     steady_load,
     switched,
 )
-from drillctrl.drilling.plant import Plant, by_form, expressions, paper_plant
+from drillctrl.drilling.plant import (
+    Evaluator,
+    Plant,
+    by_form,
+    evaluator,
+    expressions,
+    paper_plant,
+)
 
 BIT_STATES = 4
 
@@ -72,14 +78,13 @@ def _steady_bit(plant: Plant) -> _SteadyBit:
 
 
 @by_form
-def bit_response(plant: Plant) -> ca.Function:
+def bit_response(plant: Plant) -> Evaluator:
     """Return p → W0 (2, 4), w (2, 1), r (1, 4), τ0: what the bit answers about steady drilling.
 
     Its excess load is W0 X + w r X(t − τ0), X its own four states.
     """
     form, bit = expressions(plant), _steady_bit(plant)
-    outputs = [bit.load_now, bit.load_depth, bit.depth_then, steady_delay(form.c)]
-    return ca.Function("bit_response", [form.parameters], outputs)
+    return evaluator(form, [bit.load_now, bit.load_depth, bit.depth_then, steady_delay(form.c)])
 
 
 def bit_responses(bit: BitRock, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -99,23 +104,17 @@ def bit_responses(bit: BitRock, rows: FloatArray) -> tuple[FloatArray, FloatArra
     delay : array, (N,)
         τ0.
     """
-    mapped = bit_response(paper_plant(bit)).map(len(rows))(rows.T)
-    now, load, past = (
-        value.full().reshape(size, len(rows), -1).transpose(1, 0, 2)
-        for value, size in zip(mapped[:3], (2, 2, 1), strict=True)
-    )
-    return now, load @ past, mapped[3].full().ravel()
+    now, load, past, delay = bit_response(paper_plant(bit))(rows)
+    return now, load @ past, delay.ravel()
 
 
-@by_form
-def linear_depth(plant: Plant) -> ca.Function:
-    """Return p → c1, c2, d0 of the linear depth of cut d0 + c1 X + c2 Xd (Eqs. 17, 19).
+def linear_depth(plant: Plant) -> tuple[Any, ...]:
+    """Return c1, c2, d0 of the linear depth of cut d0 + c1 X + c2 Xd (Eqs. 17, 19).
 
     X and Xd are the bit's four states.
     """
-    form, bit = expressions(plant), _steady_bit(plant)
-    outputs = [bit.depth_now, bit.depth_then, steady_depth(form.c)]
-    return ca.Function("linear_depth", [form.parameters], outputs)
+    bit = _steady_bit(plant)
+    return bit.depth_now, bit.depth_then, steady_depth(expressions(plant).c)
 
 
 @by_form
@@ -195,16 +194,16 @@ class LinearArrays(NamedTuple):
         return not self.late and not self.input_delays.any()
 
 
+@by_form
+def _linear(plant: Plant) -> Evaluator:
+    form = expressions(plant)
+    return evaluator(form, list(linearisation(plant)(form.parameters)))
+
+
 def linear_arrays(plant: Plant, table: FloatArray) -> LinearArrays:
     """Return the linear plants at rows of parameters, (N, k)."""
-    count = table.shape[0]
-    function = linearisation(plant)
-    mapped = function if count == 1 else function.map(count)
-    values = []
-    for i, value in enumerate(mapped(table.T)):
-        rows, columns = function.size_out(i)
-        full = value.full().reshape(rows, count, columns)
-        values.append(np.ascontiguousarray(full.transpose(1, 0, 2)))
+    values = _linear(plant)(table)
+    count = len(table)
     late = tuple((values[i].reshape(count), values[i + 1]) for i in range(7, len(values), 2))
     a0, left, right, b, c, tau, inputs = values[:7]
     delays = inputs.reshape(count, -1)

@@ -20,7 +20,7 @@ from drillctrl.drilling.bit_rock import (
 )
 from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.linear import BIT_STATES, linear_depth, linearisation
-from drillctrl.drilling.plant import Plant, by_form, expressions
+from drillctrl.drilling.plant import Evaluator, Plant, by_form, evaluator, expressions
 
 BIT_COEFFICIENTS = ("rotary_speed", "penetration_rate", "blades")
 
@@ -117,7 +117,7 @@ _FREE = 1e-10
 
 
 @by_form
-def _motion_function(plant: Plant) -> ca.Function:
+def _motion(plant: Plant) -> Evaluator:
     form = expressions(plant)
     made = form.structure
     own = [getattr(form.q, name) for name in plant.bit.values]
@@ -125,8 +125,9 @@ def _motion_function(plant: Plant) -> ca.Function:
     matrices = [made.A, made.E, made.B, made.T, made.C, made.R]
     late = [made.delays_of_inputs, *(value for term in made.late for value in term)]
     q = ca.vertcat(*[ca.SX(value) for value in (*form.c, *own)])
-    outputs = [ca.densify(ca.SX(value)) for value in (q, load, *matrices, *late)]
-    return ca.Function("motion", [form.parameters], outputs)
+    depth = ca.horzcat(*linear_depth(plant))
+    linear = linearisation(plant)(form.parameters)[:3]
+    return evaluator(form, [q, load, *matrices, depth, *linear, *late])
 
 
 def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
@@ -137,17 +138,15 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     InputError
         If axial and torsional structure meet elsewhere than at the bit.
     """
-    values = [value.full() for value in _motion_function(plant)(parameters)]
-    q, steady, a, e, b, t, c, r, inputs, *rest = values
+    values = [value[0] for value in _motion(plant)(parameters[None])]
+    q, steady, a, e, b, t, c, r, depth, linear, left, right, inputs, *rest = values
     if e[1, 1] != 0.0 or e[3, 0] != 0.0:
         raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
     late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
-    c1, c2, d0 = (value.full() for value in linear_depth(plant)(parameters))
-    linear = [value.full() for value in linearisation(plant)(parameters)[:3]]
-    delayed = linear[1] @ linear[2][:, :BIT_STATES]
+    delayed = left @ right[:, :BIT_STATES]
     return MotionArrays(
-        q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear[0], delayed,
-        np.concatenate([c1.ravel(), c2.ravel(), d0.ravel()]), _dragged(plant),
+        q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear, delayed,
+        depth.ravel(), _dragged(plant),
     )  # fmt: skip
 
 

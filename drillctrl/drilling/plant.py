@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import casadi as ca
+import numpy as np
 
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.bit_rock import BitRock, PaperLaw
 from drillctrl.drilling.block import Block
@@ -214,6 +217,28 @@ def expressions(plant: Plant) -> Expressions:
         structure = block.signals(structure, c, record(block))
     vector = ca.vertcat(*symbols.values())
     return Expressions(vector, c, record(plant.bit), plant.bit, structure)
+
+
+Evaluator = Callable[[FloatArray], list[FloatArray]]
+
+
+def evaluator(form: Expressions, outputs: Sequence[Any]) -> Evaluator:
+    """Compile expressions: rows of parameters, (N, k) → the value of each, (N, rows, columns).
+
+    They are evaluated in one column, which costs less than many small matrices.
+    """
+    parts = [ca.densify(ca.SX(part)) for part in outputs]
+    column = ca.vertcat(*[ca.vec(part.T) for part in parts])
+    function = ca.Function("column", [form.parameters], [column])
+    ends = np.cumsum([0, *(part.numel() for part in parts)]).tolist()
+    places = [(slice(*pair), part.shape) for pair, part in zip(pairwise(ends), parts, strict=True)]
+
+    def evaluate(rows: FloatArray) -> list[FloatArray]:
+        mapped = function if len(rows) == 1 else function.map(len(rows))
+        values = mapped(rows.T).full().T
+        return [values[:, place].reshape(len(rows), *shape) for place, shape in places]
+
+    return evaluate
 
 
 def paper_plant(

@@ -34,7 +34,7 @@ def _alpha(omega0: float, delta0: float, psi: float = 14.0) -> float:
 def _stable_speeds(drawn: StabilityChart, delta0: float) -> tuple[float, float]:
     """Return the first stable range of ω0 on the line nearest to a depth of cut."""
     line = min(drawn.lines, key=lambda one: abs(one.position - delta0))
-    start, end, *_ = line.stable_intervals()[0]
+    start, end, *_ = line.stable_intervals[0]
     return start, end
 
 
@@ -80,7 +80,7 @@ def figure_5() -> Reproduced:
     ax = volume.plot()
     figure = ax.get_figure(root=True)
     highest = [
-        max((line.position for line in lines if line.stable_intervals()), default=0.0)
+        max((line.position for line in lines if line.stable_intervals), default=0.0)
         for lines in volume.lines
     ]
     step = volume.lines[0][1].position

@@ -18,7 +18,8 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import size_bound
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
-from drillctrl.spectrum.roots import Root, dominant_roots
+from drillctrl.spectrum.multiplicity import Root
+from drillctrl.spectrum.roots import dominant_roots
 
 _GAP = 1e-7
 _COLUMNS = 128

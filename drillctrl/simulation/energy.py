@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.rig import Rig

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum.polishing import EPSILON
 from drillctrl.spectrum.pseudospectral import _blocks, degree_for_reach
-from drillctrl.spectrum.roots import EPSILON, spectral_abscissa
+from drillctrl.spectrum.roots import spectral_abscissa
 
 _CHUNK = 512
 

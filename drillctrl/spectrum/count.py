@@ -15,6 +15,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
 
 IntArray = npt.NDArray[np.int64]
@@ -91,7 +92,7 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """
     bound = magnitude_bound(system, line)
     small = is_small(system.order, bound * system.max_delay)
-    return follow(reduced(system, plain=small), line, bound).result
+    return follow(_SmallLoop(system) if small else reduced(system), line, bound).result
 
 
 def is_small(order: int, turns: float) -> bool:
@@ -99,7 +100,27 @@ def is_small(order: int, turns: float) -> bool:
     return order <= _SMALL and turns < _FEW_TURNS
 
 
-def follow(loops: ReducedLoops, line: float, bound: float) -> Followed:
+class _SmallLoop:
+    """A single loop of few states by Δ itself: what `follow` asks of it, without overhead."""
+
+    count = 1
+
+    def __init__(self, system: DelaySystem) -> None:
+        self.system = system.balanced
+        self.order = system.order
+        self.delays = np.array([system.delays])
+
+    def phase_and_slope(self, s: ComplexArray) -> tuple[FloatArray, ComplexArray]:
+        """Return arg det Δ and (det Δ)'/det Δ; infinite or NaN where Δ is singular."""
+        delta, change = characteristic.matrix_and_derivative(self.system, s)
+        sign, _ = np.linalg.slogdet(delta)
+        return np.arctan2(sign.imag, sign.real), characteristic.trace_ratio(delta, change)
+
+
+_Loops = ReducedLoops | _SmallLoop
+
+
+def follow(loops: _Loops, line: float, bound: float) -> Followed:
     """Follow det Δ up a line; see `count_right_of`.
 
     Parameters
@@ -169,7 +190,7 @@ def _up(line: float, omega: FloatArray) -> ComplexArray:
     return np.asarray(line + 1j * omega, dtype=np.complex128)
 
 
-def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray:
+def _first_places(loops: _Loops, limit: float, turns: float) -> FloatArray:
     n = loops.order
     # Denser towards the bottom, where det Δ is far from its asymptote.
     if n <= _SMALL:
@@ -178,7 +199,7 @@ def _first_places(loops: ReducedLoops, limit: float, turns: float) -> FloatArray
     return np.append(omega, limit * np.geomspace(1.0, _FAR, 2 * n)[1:])
 
 
-def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
+def _traced(loops: _Loops, line: float, limits: FloatArray) -> _Traced:
     turns = limits * loops.delays.max(axis=1, initial=0.0)
     undecided = ~(turns < 0.5 * _MAX_POINTS)
     turns[undecided] = 0.0
@@ -192,8 +213,7 @@ def _traced(loops: ReducedLoops, line: float, limits: FloatArray) -> _Traced:
         infinite = ~np.isfinite(slope)
         if infinite.any():
             undecided[rows[infinite]] = True
-        width = np.diff(omega)
-        turn = np.diff(phase)
+        width, turn = omega[1:] - omega[:-1], phase[1:] - phase[:-1]
         turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
         # arg det Δ(line + iω) changes at the rate Re (det Δ)'/det Δ.
         rate, speed = slope.real, np.abs(slope)
@@ -241,7 +261,11 @@ def _counts(loops: ReducedLoops, line: float, traced: _Traced) -> IntArray:
 
 
 def _total(
-    loops: ReducedLoops, line: float, omega: FloatArray, phase: FloatArray, turn: FloatArray
+    loops: _Loops,
+    line: float,
+    omega: FloatArray,
+    phase: FloatArray,
+    turn: FloatArray,
 ) -> FloatArray:
     """Return the count of each loop from the turn of arg det Δ up to the top."""
     n, end = loops.order, np.arctan2(omega, line)
@@ -251,9 +275,9 @@ def _total(
     return np.asarray(n / 2 - (turn + n * (math.pi / 2 - end) - beyond) / math.pi)
 
 
-def _argument_beyond(loops: ReducedLoops, line: float, omega: FloatArray) -> FloatArray:
+def _argument_beyond(loops: _Loops, line: float, omega: FloatArray) -> FloatArray:
     """Return arg (det Δ(s)/sⁿ) = Σ arg (1 − μ), over the eigenvalues μ, to within π."""
-    if loops.order <= _SMALL:
+    if isinstance(loops, _SmallLoop) or loops.order <= _SMALL:
         # Each is below asin (1/k) with k = _NEAR.
         return np.zeros(loops.count)
     s = _up(line, omega)
@@ -266,9 +290,11 @@ def _argument_beyond(loops: ReducedLoops, line: float, omega: FloatArray) -> Flo
 
 
 def _phase_and_slope(
-    loops: ReducedLoops, rows: npt.NDArray[np.intp], s: ComplexArray
+    loops: _Loops, rows: npt.NDArray[np.intp], s: ComplexArray
 ) -> tuple[FloatArray, ComplexArray]:
     """Return arg det Δ and (det Δ)'/det Δ of a loop at each place; NaN where Δ is singular."""
+    if isinstance(loops, _SmallLoop):
+        return loops.phase_and_slope(s)
     if loops.count == 1:
         sign, size, slope = (part[0] for part in loops.evaluate(s[None]))
     else:

@@ -2,25 +2,26 @@
 
 Collocation supplies a starting value for every root right of a line; Aberth's simultaneous
 iteration drives all of them to the characteristic equation without two of them meeting in
-one root; contour moments give the centre of a cluster to rounding even though its members
-are known to the k-th root of rounding only.
+one root (`polishing`); clusters are told from roots apart (`multiplicity`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError, UndecidedError, checked_number
 from drillctrl.delay.reduced import reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.climb import MOST_ROOTS, Climb
 from drillctrl.spectrum.count import count_right_of
+from drillctrl.spectrum.multiplicity import CLOSE, Root, resolve
+from drillctrl.spectrum.polishing import polish
 from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,
@@ -28,142 +29,17 @@ from drillctrl.spectrum.pseudospectral import (
 )
 
 BoolArray = npt.NDArray[np.bool_]
-_Polished = tuple[ComplexArray, BoolArray]
 _Gathered = tuple[ComplexArray, BoolArray, float]
-EPSILON = float(np.finfo(float).eps)
-# Roots that a relative change of the coefficients this small makes coincide are reported
-# as one multiple root: gains are rarely known to more digits.
-MULTIPLICITY_TOLERANCE = 1e-8
-# Below this the split of a cluster is rounding and says nothing about the system.
-ROUNDING_TOLERANCE = 32 * EPSILON
-_CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
-_CLOSE = 0.2
 # How far left of the rightmost start, relative, others are polished with it: a cluster, a
 # root that stands alone.
 _WIDE = 0.1
 _NARROW = 1e-3
-# Share of a cluster's spread by which its members may be off before the circle's are taken.
-_ASTRAY = 1e-2
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
 _SMALLEST = 100
-_LARGEST_CLUSTER = 24
 # Roots that are iterated on together.
 _FEW = 100
-
-
-@dataclass(frozen=True)
-class Root:
-    """A characteristic root with imag ≥ 0; its conjugate is implied.
-
-    Attributes
-    ----------
-    real, imag : float
-        The root, or the centre of the cluster that it stands for.
-    multiplicity : int
-        Number of roots in the cluster.
-    spread : float
-        Largest distance of a member from the centre; 0 for a simple root.
-    rightmost : float
-        Largest real part of a member, the centre's where the spread is rounding.
-    residual : float
-        Smallest relative change of the coefficients that makes the value an exact root.
-    condition : float
-        κ: a small relative change ε of the coefficients moves the root by up to about
-        (κ ε)^(1/multiplicity).
-    converged : bool
-        Whether the iteration on the characteristic equation converged.
-    """
-
-    real: float
-    imag: float
-    multiplicity: int
-    spread: float
-    rightmost: float
-    residual: float
-    condition: float
-    converged: bool
-
-    @property
-    def value(self) -> complex:
-        """The root as a complex number."""
-        return complex(self.real, self.imag)
-
-    @property
-    def error(self) -> float:
-        """How far rounding may have moved ``rightmost``."""
-        reach = (self.condition * ROUNDING_TOLERANCE) ** (1.0 / self.multiplicity)
-        return float(reach)
-
-
-def polish(system: DelaySystem, start: ComplexArray) -> _Polished:
-    """Drive approximate roots to the characteristic equation, all at once.
-
-    Parameters
-    ----------
-    system : DelaySystem
-        Any.
-    start : array, (q,)
-        Approximations with imag ≥ 0. Their conjugates take part implicitly.
-
-    Returns
-    -------
-    roots : array, (q,)
-        Improved values.
-    converged : bool array, (q,)
-        Whether the last correction was at the level of rounding.
-    """
-    if start.size == 1:
-        value, converged = _polish_one(system, complex(start[0]))
-        return np.array([value]), np.array([converged])
-    s = np.where(start.imag > 0, start, start.real + 0j)
-    done = np.zeros(s.shape, dtype=bool)
-    last = np.full(s.shape, np.inf)
-    for _ in range(24):
-        # What runs away is no number in the end, and does not converge.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            newton = 1.0 / characteristic.log_derivative(system, s)
-        everyone = np.concatenate([s, s[s.imag > 0].conj()]) if s.imag.any() else s
-        gap = s[:, None] - everyone
-        gap[gap == 0] = np.inf
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = newton / (1.0 - newton * (1.0 / gap).sum(axis=1))
-        step.imag[s.imag == 0] = 0.0
-        step[done] = 0.0
-        size, scale = np.abs(step), 1.0 + np.abs(s)
-        # Once corrections no longer shrink, what remains is noise of the evaluation.
-        stalled = (size >= last) & (size < 1e-3 * scale)
-        step[stalled] = 0.0
-        if (size > 0.3 * scale).any():
-            with np.errstate(over="ignore", invalid="ignore"):
-                step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
-        s = s - step
-        s.imag = np.abs(s.imag)
-        last = size
-        # The iteration squares the error relative to the distance of the next root.
-        square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
-        done |= stalled | square | (size <= 4 * EPSILON * scale)
-        if done.all():
-            break
-    return s, done
-
-
-def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
-    """Do for a single root what `polish` does for many, at half the cost."""
-    last = math.inf
-    for _ in range(24):
-        newton = 1.0 / characteristic.log_derivative_at(system, s)
-        step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
-        size, scale = abs(step), 1.0 + abs(s)
-        if size >= last and size < 1e-3 * scale:
-            return s, True
-        s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
-        s = complex(s.real, abs(s.imag))
-        last = size
-        if size**2 <= EPSILON * scale * min(2.0 * s.imag or scale, scale):
-            return s, True
-    return s, False
 
 
 def _gather(system: DelaySystem, depth: float, line: float | None = None) -> _Gathered:
@@ -219,8 +95,8 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
         slack = _WIDE
         if depth == 0.0 and line is None:
             top = inside[int(np.argmax(inside.real))]
-            near = int((np.abs(inside - top) < _CLOSE * (1.0 + abs(top))).sum())
-            slack = _NARROW if near == 1 and not 0.0 < top.imag < _CLOSE else slack
+            near = int((np.abs(inside - top) < CLOSE * (1.0 + abs(top))).sum())
+            slack = _NARROW if near == 1 and not 0.0 < top.imag < CLOSE else slack
         start = inside[inside.real >= floor - slack * (1.0 + np.abs(inside))]
         s, done = polish(system, start)
         if slack == _NARROW and (np.abs(s - start) > _NARROW * (1.0 + np.abs(start))).any():
@@ -291,10 +167,10 @@ def spectral_abscissa(system: DelaySystem) -> float:
     system, unit = _in_own_units(system)
     s, done, _ = _gather(system, 0.0)
     top = complex(s[0])
-    isolated = s.size == 1 or (np.abs(top - s[1:]) > _CLOSE * (1.0 + abs(top))).all()
-    if isolated and (top.imag == 0 or top.imag > _CLOSE):
+    isolated = s.size == 1 or (np.abs(top - s[1:]) > CLOSE * (1.0 + abs(top))).all()
+    if isolated and (top.imag == 0 or top.imag > CLOSE):
         return top.real / unit
-    return max(root.rightmost for root in _resolve(system, s, done)) / unit
+    return max(root.rightmost for root in resolve(system, s, done)) / unit
 
 
 def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
@@ -325,7 +201,7 @@ def known_roots(system: DelaySystem, most: int | None = None) -> tuple[tuple[Roo
         cut = half + int(np.argmax(s.real[half:most] - s.real[half + 1 : most + 1])) + 1
         floor = max(floor, float(s.real[cut]))
         s, done = s[:cut], done[:cut]
-    return _slowed(_resolve(system, s, done), unit), floor / unit
+    return _slowed(resolve(system, s, done), unit), floor / unit
 
 
 def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ...]:
@@ -362,7 +238,7 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
             found = gather(system, 0.0, line)
             if found is None:
                 continue
-            roots = tuple(root for root in _resolve(system, *found[:2]) if root.rightmost >= line)
+            roots = tuple(root for root in resolve(system, *found[:2]) if root.rightmost >= line)
             if _total(roots) == counted:
                 return _slowed(roots, unit)
     except UndecidedError as error:
@@ -403,153 +279,6 @@ def _slowed(roots: tuple[Root, ...], unit: float) -> tuple[Root, ...]:
     )
 
 
-def _resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root, ...]:
-    """Merge clusters and attach residual and condition."""
-    left = list(range(s.size))
-    roots: list[Root] = []
-    while left:
-        first = left[0]
-        cluster = _cluster(system, s, first, left)
-        if cluster is None:
-            members, root = [first], _simple_root(system, complex(s[first]), bool(done[first]))
-        else:
-            members, root = cluster
-        roots.append(root)
-        left = [i for i in left if i not in members]
-    return tuple(sorted(roots, key=lambda root: (-root.rightmost, root.imag)))
-
-
 def _total(roots: tuple[Root, ...]) -> int:
     """Return the number of roots, conjugates and multiplicities counted."""
     return sum(root.multiplicity * (2 if root.imag > 0 else 1) for root in roots)
-
-
-def _weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
-    """S(s) = ‖A0‖ + Σ ‖Ai‖ |exp(−sτi)|, what relative changes are measured against."""
-    total = np.full(s.shape, float(np.linalg.norm(system.A0, 2)))
-    for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        total += np.linalg.norm(delayed, 2) * np.exp(np.minimum(-s.real * delay, 300.0))
-    return np.asarray(np.maximum(total, 1e-300))
-
-
-def _smallest_singular(system: DelaySystem, s: ComplexArray) -> FloatArray:
-    values = np.linalg.svd(characteristic.matrix(system, s), compute_uv=False)
-    return np.asarray(values[..., -1])
-
-
-def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
-    delta, slope = characteristic.matrix_and_derivative(system, np.array(value))
-    left, sizes, right = np.linalg.svd(delta)
-    weight = float(_weight(system, np.array([value]))[0])
-    turn = abs(left[:, -1].conj() @ slope @ right[-1].conj())
-    return Root(
-        float(value.real),
-        float(value.imag),
-        1,
-        0.0,
-        float(value.real),
-        float(sizes[-1]) / weight,
-        weight / max(float(turn), 1e-300),
-        converged,
-    )
-
-
-def _cluster(
-    system: DelaySystem, s: ComplexArray, first: int, left: list[int]
-) -> tuple[list[int], Root] | None:
-    """Return the largest cluster about root ``first`` that is one multiple root, if any."""
-    mirrored = [(i, s[i]) for i in left] + [(i, s[i].conjugate()) for i in left if s[i].imag > 0]
-    mirrored.sort(key=lambda item: abs(item[1] - s[first]))
-    values = np.array([value for _, value in mirrored])
-    # Roots of a chain lie 2π/τ apart.
-    close = _CLOSE * (1.0 + abs(s[first]))
-    close = min(close, 2.0 / system.max_delay) if system.delays else close
-    near = min(int((np.abs(values - s[first]) < close).sum()), _LARGEST_CLUSTER)
-    for size in range(near, 1, -1):
-        members = values[:size]
-        centre = complex(members.mean())
-        if abs(centre.imag) < 1e-9 * (1.0 + abs(centre)):
-            centre = complex(centre.real, 0.0)
-        spread = float(np.abs(members - centre).max())
-        outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
-        if outside < 4.0 * spread:
-            continue
-        # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
-        wide = min(0.2 * (1.0 + abs(centre)), 0.3 / system.max_delay if system.delays else 1.0)
-        radius = min(max(2.0 * spread, wide), 0.5 * outside)
-        root = _multiple_root(system, members, centre, radius)
-        if root is not None:
-            return sorted({i for i, _ in mirrored[:size]}), root
-    return None
-
-
-def _change(
-    system: DelaySystem, centre: complex, tight: ComplexArray, ratio: ComplexArray
-) -> float:
-    """Return the relative change of the coefficients that makes members of a cluster one."""
-    at = centre + tight
-    sizes = _smallest_singular(system, at) / _weight(system, at)
-    return float((np.abs(1.0 - ratio) * sizes).max())
-
-
-def _from_moments(moments: ComplexArray) -> ComplexArray:
-    """Return numbers by their power sums Σ zʲ, j = 1 … k (Newton's identities)."""
-    size = moments.size
-    coefficients = np.zeros(size + 1, dtype=complex)
-    coefficients[0] = 1.0
-    for j in range(1, size + 1):
-        known = coefficients[:j] @ moments[j - 1 :: -1][:j]
-        coefficients[j] = -known / j
-    return np.asarray(np.roots(coefficients), dtype=complex)
-
-
-def _multiple_root(
-    system: DelaySystem, members: ComplexArray, centre: complex, radius: float
-) -> Root | None:
-    """Check that k roots in a disc are one k-fold root to within the tolerance.
-
-    The moments of d ln det Δ over the circle count the roots inside and give their mean,
-    which is analytic in the coefficients although the single roots are not.
-    """
-    size = members.size
-    offsets = members - members.mean()
-    spread = float(np.abs(offsets).max())
-    # Measured where the split is felt most: a circle just outside the members.
-    tight = max(2.0 * spread, 1e-6 * radius) * _CIRCLE
-    ratio = np.prod(tight[:, None] / (tight[:, None] - offsets[None, :]), axis=1)
-    # Most that are no multiple root show it at a single point, even if the centre is rough.
-    worst = [int(np.abs(1.0 - ratio).argmax())]
-    if _change(system, centre, tight[worst], ratio[worst]) > 1e3 * MULTIPLICITY_TOLERANCE:
-        return None
-    ring = radius * _CIRCLE
-    slope = characteristic.log_derivative(system, centre + ring)
-    count = complex((slope * ring).mean())
-    if not abs(count - size) < 0.2:
-        return None
-    shift = complex((slope * ring * ring).mean()) / size
-    if not abs(shift) < radius:
-        return None
-    refined = complex(centre.real + shift.real, centre.imag + shift.imag if centre.imag else 0.0)
-    change = _change(system, refined, tight, ratio)
-    if change > MULTIPLICITY_TOLERANCE:
-        return None
-    if change > ROUNDING_TOLERANCE:
-        # So close together the iteration may come to rest between roots: the circle knows better.
-        exact = centre + _from_moments(np.array([(slope * ring ** (j + 1)).mean() for j in
-                                                 range(1, size + 1)]))  # fmt: skip
-        astray = np.abs(exact[:, None] - members[None, :]).min(axis=1).max()
-        if astray > _ASTRAY * spread:
-            members, spread = exact, float(np.abs(exact - exact.mean()).max())
-    outer = _smallest_singular(system, refined + ring)
-    weight = float(_weight(system, np.array([refined]))[0])
-    rounding = change <= ROUNDING_TOLERANCE
-    return Root(
-        refined.real,
-        abs(refined.imag),
-        size,
-        spread,
-        refined.real if rounding else float(members.real.max()),
-        float(_smallest_singular(system, np.array([refined]))[0]) / weight,
-        weight * radius**size / float(outer.min()),
-        True,
-    )

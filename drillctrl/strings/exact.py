@@ -158,7 +158,7 @@ def exact_loop(case: Case, top: TopStiffness | None = None) -> ExactLoop:
     plant, _ = case.physics("an exact loop")
     if not isinstance(plant.string, PipeString):
         raise InputError("string", type(plant.string).__name__, "a PipeString")
-    now, load, then, delay = (v.full() for v in bit_response(plant)(case.parameter_vector))
+    now, load, then, delay = (v[0] for v in bit_response(plant)(case.parameter_vector[None]))
     string, then = plant.string.string, load @ then
     if top is not None:
         return ExactLoop(string, now, then, float(delay[0, 0]), _with_stiffness(top))

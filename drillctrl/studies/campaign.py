@@ -22,8 +22,8 @@ from drillctrl.base.workers import Progress
 from drillctrl.simulation.controller import Controller
 from drillctrl.studies.tasks import controller_at, run_tasks
 from drillctrl.studies.trial import Trial, try_point
+from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.grid import Grid
-from drillctrl.tables.table import GainTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

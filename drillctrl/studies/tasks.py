@@ -15,7 +15,7 @@ from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.spectrum.roots import spectral_abscissa
-from drillctrl.tables.table import GainTable
+from drillctrl.tables.gain_table import GainTable
 
 
 class PointTask(Protocol):

@@ -35,7 +35,7 @@ from drillctrl.studies.vibration_point import (
 )
 from drillctrl.studies.vibration_text import controller_text, map_summary, place_text
 from drillctrl.studies.vibration_values import MapValues, Severity
-from drillctrl.tables.table import GainTable
+from drillctrl.tables.gain_table import GainTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,7 @@ from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.status import Outcome
 from drillctrl.studies.lattice import Cell, Node, fine_shape
 from drillctrl.studies.vibration_point import QUANTITIES
-from drillctrl.tables.table import GainTable
+from drillctrl.tables.gain_table import GainTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.rig import Rig
+from drillctrl.tables.gain_table import ABSCISSA_ERROR, FALLBACKS, GainTable
 from drillctrl.tables.grid import MAX_NODES, Axis, Grid
 from drillctrl.tables.interpolation import (
     CELL_NAMES,
@@ -28,7 +29,6 @@ from drillctrl.tables.interpolation import (
     cell_shape,
     corners_of,
 )
-from drillctrl.tables.table import ABSCISSA_ERROR, FALLBACKS, GainTable
 
 SCHEMA = "drillctrl/gain-table/1"
 SIGN = "u = K1 Y(t) + K2 Y(t - tau0) is added to theta''; Y: outputs; tau0 = 2 pi/(blades omega0)"

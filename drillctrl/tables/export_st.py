@@ -9,9 +9,9 @@ from drillctrl.base.files import write_text
 from drillctrl.base.templates import filled
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.quantities import SI_UNITS
+from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.reserved import is_identifier
 from drillctrl.tables.sampled import sampled_controller
-from drillctrl.tables.table import GainTable
 
 # What the block declares, so that its own name is none of these.
 _VARIABLES = """

@@ -18,7 +18,7 @@ from drillctrl.base.files import check_regular, replacing
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
-from drillctrl.tables.table import GainTable
+from drillctrl.tables.gain_table import GainTable
 
 # Beyond this no table of at most a million nodes is meant.
 MAX_BYTES = 1_000_000_000

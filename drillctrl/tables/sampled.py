@@ -13,9 +13,9 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.tables.document import plain_values, to_document
+from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE
-from drillctrl.tables.table import GainTable
 
 # A ring of samples longer than this fits no drive.
 _DEEPEST = 1_000_000

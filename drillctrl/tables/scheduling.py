@@ -11,7 +11,7 @@ from drillctrl.base.errors import checked_number
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.tables.table import GainTable
+from drillctrl.tables.gain_table import GainTable
 
 
 def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> FloatArray:

@@ -135,7 +135,7 @@ def covered(drawn, x, y):
     position, along = (y, x) if drawn.rows else (x, y)
     places = np.array([line.position for line in drawn.lines])
     line = drawn.lines[int(np.argmin(np.abs(places - position)))]
-    return any(start <= along <= stop for start, stop, _, _ in line.stable_intervals())
+    return any(start <= along <= stop for start, stop, _, _ in line.stable_intervals)
 
 
 def test_regions_are_confirmed_by_the_argument_principle():

@@ -142,7 +142,7 @@ def test_root_locus_enters_the_circle_where_drilling_becomes_stable():
     assert not stable[0]
     exact = chart(OperatingPoint(10.0, 1.0, 14.0), ("omega0", 3.0, 24.0), ("delta0", 0.9, 1.1))
     line = min(exact.lines, key=lambda one: abs(one.position - 1.0))
-    edge = line.stable_intervals()[0][0]
+    edge = line.stable_intervals[0][0]
     assert abs(first - edge) < 2 * (locus.values[1] - locus.values[0])
     with pytest.raises(InputError, match="axis"):
         root_locus(POINT, ("K1_1", -1.0, 1.0))

@@ -1,0 +1,83 @@
+"""Approximate roots driven to the characteristic equation, all at once (Aberth's iteration)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from drillctrl.base.arrays import ComplexArray
+from drillctrl.delay.system import DelaySystem
+from drillctrl.spectrum import characteristic
+
+EPSILON = float(np.finfo(float).eps)
+
+
+def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
+    """Drive approximate roots to the characteristic equation, all at once.
+
+    Parameters
+    ----------
+    system : DelaySystem
+        Any.
+    start : array, (q,)
+        Approximations with imag ≥ 0. Their conjugates take part implicitly.
+
+    Returns
+    -------
+    roots : array, (q,)
+        Improved values.
+    converged : bool array, (q,)
+        Whether the last correction was at the level of rounding.
+    """
+    if start.size == 1:
+        value, converged = _polish_one(system, complex(start[0]))
+        return np.array([value]), np.array([converged])
+    s = np.where(start.imag > 0, start, start.real + 0j)
+    done = np.zeros(s.shape, dtype=bool)
+    last = np.full(s.shape, np.inf)
+    for _ in range(24):
+        # What runs away is no number in the end, and does not converge.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = 1.0 / characteristic.log_derivative(system, s)
+        everyone = np.concatenate([s, s[s.imag > 0].conj()]) if s.imag.any() else s
+        gap = s[:, None] - everyone
+        gap[gap == 0] = np.inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = newton / (1.0 - newton * (1.0 / gap).sum(axis=1))
+        step.imag[s.imag == 0] = 0.0
+        step[done] = 0.0
+        size, scale = np.abs(step), 1.0 + np.abs(s)
+        # Once corrections no longer shrink, what remains is noise of the evaluation.
+        stalled = (size >= last) & (size < 1e-3 * scale)
+        step[stalled] = 0.0
+        if (size > 0.3 * scale).any():
+            with np.errstate(over="ignore", invalid="ignore"):
+                step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
+        s = s - step
+        s.imag = np.abs(s.imag)
+        last = size
+        # The iteration squares the error relative to the distance of the next root.
+        square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
+        done |= stalled | square | (size <= 4 * EPSILON * scale)
+        if done.all():
+            break
+    return s, done
+
+
+def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
+    """Do for a single root what `polish` does for many, at half the cost."""
+    last = math.inf
+    for _ in range(24):
+        newton = 1.0 / characteristic.log_derivative_at(system, s)
+        step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
+        size, scale = abs(step), 1.0 + abs(s)
+        if size >= last and size < 1e-3 * scale:
+            return s, True
+        s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
+        s = complex(s.real, abs(s.imag))
+        last = size
+        if size**2 <= EPSILON * scale * min(2.0 * s.imag or scale, scale):
+            return s, True
+    return s, False
