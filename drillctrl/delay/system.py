@@ -154,6 +154,11 @@ class DelaySystem:
         """
         return tuple(low_rank_factors(matrix) for matrix in self.delayed)
 
+    @functools.cached_property
+    def norms(self) -> tuple[float, ...]:
+        """Spectral norms of A0 and of each Ai."""
+        return tuple(float(np.linalg.norm(a, 2)) for a in (self.A0, *self.delayed))
+
     def scaled_time(self, unit: float) -> DelaySystem:
         """Return the same system with time counted in ``unit`` old units.
 

@@ -14,6 +14,8 @@ from drillctrl.delay.system import DelaySystem
 # Beyond this, exp(−s τ) would overflow when squared; such an s lies far left of any line
 # that matters.
 _EXPONENT_LIMIT = 300.0
+# Numbers in one temporary array: 8 MB of complex ones.
+_CHUNK = 500_000
 
 
 def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
@@ -60,7 +62,11 @@ def log_derivative_at(system: DelaySystem, s: complex) -> complex:
 
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
-    return trace_ratio(*matrix_and_derivative(system, np.asarray(s, dtype=complex)))
+    points = np.asarray(s, dtype=complex)
+    if points.ndim != 1 or points.size * system.order**2 <= _CHUNK:
+        return trace_ratio(*matrix_and_derivative(system, points))
+    parts = np.array_split(points, points.size * system.order**2 // _CHUNK + 1)
+    return np.concatenate([trace_ratio(*matrix_and_derivative(system, part)) for part in parts])
 
 
 def trace_ratio(delta: ComplexArray, slope: ComplexArray) -> ComplexArray:

@@ -38,6 +38,8 @@ MULTIPLICITY_TOLERANCE = 1e-8
 ROUNDING_TOLERANCE = 32 * EPSILON
 _CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 _CLOSE = 0.2
+# A count on a circle that is off by more is disturbed by a root close to it.
+_SHARP_COUNT = 1e-8
 # How far left of the rightmost start, relative, others are polished with it: a cluster, a
 # root that stands alone.
 _WIDE = 0.1
@@ -47,6 +49,8 @@ _ASTRAY = 1e-2
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
+# The same as a multiple of the states: one point of a count costs as much as their cube.
+_LARGEST_SHARE = 24
 _SMALLEST = 100
 _LARGEST_CLUSTER = 24
 # Roots that are iterated on together.
@@ -187,7 +191,8 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
     ranks = sum(left.shape[1] for left, _ in system.factors)
 
     def in_reach(degree: int) -> bool:
-        return degree < MAX_DEGREE and (system.order + degree * ranks <= _LARGEST or degree <= 8)
+        size = system.order + degree * ranks
+        return degree < MAX_DEGREE and size <= max(_LARGEST, _LARGEST_SHARE * system.order)
 
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
@@ -228,7 +233,10 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
             start = inside[inside.real >= floor - _WIDE * (1.0 + np.abs(inside))]
             s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
-        if (done & ~strayed).all():
+        lost = ~done | strayed
+        # Far left of what is wanted the collocation may be rough.
+        if not (lost & ((start.real >= floor) | (s.real >= floor))).any():
+            s, done = s[~lost], done[~lost]
             order = np.argsort(-s.real, kind="stable")
             return s[order], done[order], floor
         degree *= 2
@@ -426,9 +434,10 @@ def _total(roots: tuple[Root, ...]) -> int:
 
 def _weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
     """S(s) = ‖A0‖ + Σ ‖Ai‖ |exp(−sτi)|, what relative changes are measured against."""
-    total = np.full(s.shape, float(np.linalg.norm(system.A0, 2)))
-    for delay, delayed in zip(system.delays, system.delayed, strict=True):
-        total += np.linalg.norm(delayed, 2) * np.exp(np.minimum(-s.real * delay, 300.0))
+    first, *others = system.norms
+    total = np.full(s.shape, first)
+    for delay, norm in zip(system.delays, others, strict=True):
+        total += norm * np.exp(np.minimum(-s.real * delay, 300.0))
     return np.asarray(np.maximum(total, 1e-300))
 
 
@@ -472,7 +481,7 @@ def _cluster(
             centre = complex(centre.real, 0.0)
         spread = float(np.abs(members - centre).max())
         outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
-        if outside < 4.0 * spread:
+        if outside <= 4.0 * spread:
             continue
         # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
         wide = min(0.2 * (1.0 + abs(centre)), 0.3 / system.max_delay if system.delays else 1.0)
@@ -521,9 +530,13 @@ def _multiple_root(
     worst = [int(np.abs(1.0 - ratio).argmax())]
     if _change(system, centre, tight[worst], ratio[worst]) > 1e3 * MULTIPLICITY_TOLERANCE:
         return None
-    ring = radius * _CIRCLE
-    slope = characteristic.log_derivative(system, centre + ring)
-    count = complex((slope * ring).mean())
+    for radius in (radius, 0.5 * radius, 0.25 * radius):
+        ring = radius * _CIRCLE
+        slope = characteristic.log_derivative(system, centre + ring)
+        count = complex((slope * ring).mean())
+        # A root that was not gathered may stand close outside, and would pull at the mean.
+        if abs(count - size) < _SHARP_COUNT or radius < 8.0 * spread:
+            break
     if not abs(count - size) < 0.2:
         return None
     shift = complex((slope * ring * ring).mean()) / size
