@@ -78,15 +78,44 @@ def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
     return numbers
 
 
+def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[str, float]:
+    """Return dimensionless numbers of states by name; with a rig each carries its unit.
+
+    Names are those of the bit, ``x``, ``theta`` and their rates, or of a further coordinate
+    that begins so, which is of the same kind.
+    """
+    if rig is None:
+        return read_numbers(option, text, example)
+    from drillctrl.base import units
+    from drillctrl.drilling.quantities import si_scale
+
+    kinds = (
+        ("dtheta", "angular_rate", units.ROTARY_SPEED),
+        ("theta", "angle", units.ANGLE),
+        ("dx", "axial_rate", units.SPEED),
+        ("x", "length", units.LENGTH),
+    )
+    numbers = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals:
+            raise InputError(option, text, f"of the form {example}")
+        for start, quantity, dimension in kinds:
+            if name.startswith(start):
+                unit = si_scale(quantity, rig)
+                numbers[name] = read_quantity(f"{option} {name}", value, dimension, unit) / unit
+                break
+        else:
+            raise InputError(option, text, "of states x, dx, theta, dtheta")
+    return numbers
+
+
 def read_time(option: str, text: str, rig: Rig | None) -> float:
-    """Return dimensionless time from a number, or from seconds of a rig."""
+    """Return dimensionless time from a number, or of a rig from a time with its unit."""
     from drillctrl.base import units
 
-    try:
-        return float(text)
-    except ValueError:
-        unit = None if rig is None else rig.time_scale
-        return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
+    unit = None if rig is None else rig.time_scale
+    return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
 
 
 def read_scenario(
@@ -110,7 +139,11 @@ def read_scenario(
     if start != "steady" and start not in START_NAMES:
         raise InputError("--start", start, f"steady, {', '.join(START_NAMES)}")
     usual = "dx=1,dtheta=1" if start == "steady" else ""
-    kick = read_numbers("--initial", usual if initial is None else initial, "dx=1,dtheta=1")
+    if initial is None:
+        kick = read_numbers("--initial", usual, "dx=1,dtheta=1")
+    else:
+        example = "dx=1,dtheta=1, or with a rig 'dx=1 m/h,dtheta=5 rpm'"
+        kick = read_states("--initial", initial, example, rig)
     if start in ("steady", "rest", "stick"):
         return Scenario(start, kick, later)
     if initial is not None:
@@ -215,7 +248,8 @@ def read_controller(
         given["activation"] = read_time("--activation", options["activation"], rig)
     given.update(read_surroundings(options, rig))
     if options["noise"]:
-        given["noise"] = read_numbers("--noise", options["noise"], "theta=0.01,dtheta=0.1")
+        example = "theta=0.01,dtheta=0.1, or with a rig 'theta=0.01 rad,dtheta=1 rpm'"
+        given["noise"] = read_states("--noise", options["noise"], example, rig)
         given["seed"] = options["seed"]
     if options["delay"] != "fixed":
         given["delay"] = options["delay"]

@@ -470,6 +470,8 @@ def _cluster(
     mirrored = [(i, s[i]) for i in left] + [(i, s[i].conjugate()) for i in left if s[i].imag > 0]
     mirrored.sort(key=lambda item: abs(item[1] - s[first]))
     values = np.array([value for _, value in mirrored])
+    settled = np.delete(s, left)
+    beside = np.abs(np.concatenate([settled, settled.conj()]) - s[first]).min(initial=math.inf)
     # Roots of a chain lie 2π/τ apart.
     close = _CLOSE * (1.0 + abs(s[first]))
     close = min(close, 2.0 / system.max_delay) if system.delays else close
@@ -481,6 +483,7 @@ def _cluster(
             centre = complex(centre.real, 0.0)
         spread = float(np.abs(members - centre).max())
         outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
+        outside = min(outside, float(beside) - abs(centre - s[first]))
         if outside <= 4.0 * spread:
             continue
         # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
@@ -530,17 +533,17 @@ def _multiple_root(
     worst = [int(np.abs(1.0 - ratio).argmax())]
     if _change(system, centre, tight[worst], ratio[worst]) > 1e3 * MULTIPLICITY_TOLERANCE:
         return None
-    for radius in (radius, 0.5 * radius, 0.25 * radius):
-        ring = radius * _CIRCLE
+    for reach in (radius, 0.5 * radius, 0.25 * radius):
+        ring = reach * _CIRCLE
         slope = characteristic.log_derivative(system, centre + ring)
         count = complex((slope * ring).mean())
         # A root that was not gathered may stand close outside, and would pull at the mean.
-        if abs(count - size) < _SHARP_COUNT or radius < 8.0 * spread:
+        if abs(count - size) < _SHARP_COUNT or reach < 8.0 * spread:
             break
     if not abs(count - size) < 0.2:
         return None
     shift = complex((slope * ring * ring).mean()) / size
-    if not abs(shift) < radius:
+    if not abs(shift) < reach:
         return None
     refined = complex(centre.real + shift.real, centre.imag + shift.imag if centre.imag else 0.0)
     change = _change(system, refined, tight, ratio)
@@ -555,6 +558,9 @@ def _multiple_root(
             members, spread = exact, float(np.abs(exact - exact.mean()).max())
     outer = _smallest_singular(system, refined + ring)
     weight = float(_weight(system, np.array([refined]))[0])
+    residual = float(_smallest_singular(system, np.array([refined]))[0]) / weight
+    if residual > MULTIPLICITY_TOLERANCE:
+        return None
     rounding = change <= ROUNDING_TOLERANCE
     return Root(
         refined.real,
@@ -562,7 +568,7 @@ def _multiple_root(
         size,
         spread,
         refined.real if rounding else float(members.real.max()),
-        float(_smallest_singular(system, np.array([refined]))[0]) / weight,
-        weight * radius**size / float(outer.min()),
+        residual,
+        weight * reach**size / float(outer.min()),
         True,
     )
