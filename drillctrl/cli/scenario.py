@@ -59,7 +59,7 @@ def controller_options(command: Command) -> Command:
         *_SURROUNDINGS,
         click.option(
             "--noise", default="", metavar="NAME=DEVIATION",
-            help="On each sample, such as theta=0.01,dtheta=0.1.",
+            help="On each sample: theta=0.01,dtheta=0.1; with a rig 'dtheta=1 rpm'.",
         ),
         click.option("--seed", type=int, default=0, show_default=True, help="Of the noise."),
     ]  # fmt: skip
@@ -118,6 +118,14 @@ def read_time(option: str, text: str, rig: Rig | None) -> float:
     return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
 
 
+def read_disturbance(text: str | None, rig: Rig | None) -> dict[str, float]:
+    """Return what steady drilling is disturbed by, as it is usual if nothing was typed."""
+    if text is None:
+        return {"dx": 1.0, "dtheta": 1.0}
+    example = "dx=1,dtheta=1, or with a rig 'dx=1 m/h,dtheta=5 rpm'"
+    return read_states("--initial", text, example, rig)
+
+
 def read_scenario(
     start: str,
     initial: str | None,
@@ -138,12 +146,7 @@ def read_scenario(
     later = tuple(_read_change(text, point, rig) for text in changes)
     if start != "steady" and start not in START_NAMES:
         raise InputError("--start", start, f"steady, {', '.join(START_NAMES)}")
-    usual = "dx=1,dtheta=1" if start == "steady" else ""
-    if initial is None:
-        kick = read_numbers("--initial", usual, "dx=1,dtheta=1")
-    else:
-        example = "dx=1,dtheta=1, or with a rig 'dx=1 m/h,dtheta=5 rpm'"
-        kick = read_states("--initial", initial, example, rig)
+    kick = {} if initial is None and start != "steady" else read_disturbance(initial, rig)
     if start in ("steady", "rest", "stick"):
         return Scenario(start, kick, later)
     if initial is not None:
@@ -194,8 +197,11 @@ def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:
         elif name in in_rig_units:
             field, dimension, unit = in_rig_units[name]
             arguments[field] = units.to_si(f"--change {name}", value, dimension) / unit
-        elif name in plain:
+        elif name in plain and rig is None:
             arguments[plain[name]] = read_numbers("--change", f"{name}={value}", _CHANGE)[name]
+        elif name in plain:
+            instead = {"omega0": "speed", "v0": "rop", "psi": "rock-strength"}[name]
+            raise InputError("--change", text, f"with {instead} and its unit in place of {name}")
         else:
             raise InputError("--change", text, _CHANGE)
     return Change(**arguments)
@@ -299,6 +305,7 @@ def _from_table(
     return scheduled(table, point, scenario, duration=duration, **given)
 
 
-def read_duration(text: str, rig: Rig | None) -> float:
-    """Return the dimensionless length of a run."""
-    return checked_number("duration", read_time("--duration", text, rig), 0.0, open_low=True)
+def read_duration(text: str | None, rig: Rig | None, usual: float = 200.0) -> float:
+    """Return the dimensionless length of a run, as it is usual if none was typed."""
+    length = usual if text is None else read_time("--duration", text, rig)
+    return checked_number("duration", length, 0.0, open_low=True)

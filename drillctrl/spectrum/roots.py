@@ -37,6 +37,9 @@ MULTIPLICITY_TOLERANCE = 1e-8
 # Below this the split of a cluster is rounding and says nothing about the system.
 ROUNDING_TOLERANCE = 32 * EPSILON
 _CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
+# An iteration that comes to rest with steps larger than this has found a multiple root, or
+# nothing: at a root Δ is singular to so much.
+_ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
 _CLOSE = 0.2
 # A count on a circle that is off by more is disturbed by a root close to it.
 _SHARP_COUNT = 1e-8
@@ -150,7 +153,15 @@ def polish(system: DelaySystem, start: ComplexArray) -> _Polished:
         done |= stalled | square | (size <= 4 * EPSILON * scale)
         if done.all():
             break
+    rough = np.flatnonzero(done & (last > _ROUGH_STEP * (1.0 + np.abs(s))))
+    if rough.size:
+        done[rough] = _are_roots(system, s[rough])
     return s, done
+
+
+def _are_roots(system: DelaySystem, s: ComplexArray) -> BoolArray:
+    """Whether Δ is singular to rounding: of a multiple root more cannot be told."""
+    return np.asarray(_smallest_singular(system, s) <= _SINGULAR * _weight(system, s))
 
 
 def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
@@ -161,7 +172,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
         step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
         size, scale = abs(step), 1.0 + abs(s)
         if size >= last and size < 1e-3 * scale:
-            return s, True
+            return s, size <= _ROUGH_STEP * scale or bool(_are_roots(system, np.array([s]))[0])
         s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
         s = complex(s.real, abs(s.imag))
         last = size
