@@ -52,8 +52,8 @@ _ASTRAY = 1e-2
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
-# The same as a multiple of the states: one point of a count costs as much as their cube.
-_LARGEST_SHARE = 24
+# The same of many states, as a multiple of them: a point of a count costs their cube.
+_MANY, _LARGEST_SHARE = 30, 24
 _SMALLEST = 100
 _LARGEST_CLUSTER = 24
 # Roots that are iterated on together.
@@ -203,7 +203,8 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
 
     def in_reach(degree: int) -> bool:
         size = system.order + degree * ranks
-        return degree < MAX_DEGREE and size <= max(_LARGEST, _LARGEST_SHARE * system.order)
+        largest = _LARGEST_SHARE * system.order if system.order >= _MANY else _LARGEST
+        return degree < MAX_DEGREE and size <= largest
 
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
@@ -580,6 +581,6 @@ def _multiple_root(
         spread,
         refined.real if rounding else float(members.real.max()),
         residual,
-        weight * reach**size / float(outer.min()),
+        weight * reach**size / max(float(outer.min()), 1e-300),
         True,
     )
