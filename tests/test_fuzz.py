@@ -56,7 +56,9 @@ NAMES = [
     "delta0=nan:1", "psi=1:1", "speed=50:180 rpm", "rop=5:50:3 m/h", "t=1,psi=9", "t=1,t=2",
     "dx=1", "dx=1,dx=2", "theta=nan", "1:2:3", "4:24:1000000000", "0:0:0", "1:2:-3", "1:2:1.5",
 ]  # fmt: skip
-VALUES = st.sampled_from([*NUMBERS, *TEXTS, *QUANTITIES, *NAMES]) | st.text(max_size=8)
+# No system passes a zero byte on, nor half a character.
+_ANY = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=8)
+VALUES = st.sampled_from([*NUMBERS, *TEXTS[:3], *TEXTS[4:], *QUANTITIES, *NAMES]) | _ANY
 
 RIG = ("--rig", "table1", "--speed", "150 rpm", "--rop", "20 m/h")
 # Verb → what makes it quick when all else is right; None: too long, only what is refused is tried.
