@@ -194,6 +194,8 @@ from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
+from .studies.saving import load_result as load_result
+from .studies.saving import save_result as save_result
 from .studies.vibration import VibrationMap as VibrationMap
 from .studies.vibration import vibration_map as vibration_map
 from .studies.vibration_values import Severity as Severity

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from drillctrl import cli, save_rig, table1
+from drillctrl import RigPoint, cli, save_rig, simulate, table1
 
 
 def run(capsys, *arguments):
@@ -155,6 +155,19 @@ BAD = [
     ([*CONTROLLED, "--K1", "1 kN*m/rad,2"], "--K1 = 1 kN*m/rad,2: must be 1 gain(s)"),
     ([*CONTROLLED, "--K1", "1 kN*m/rad", "--limit", "3"], "--limit = 3: must be given with its"),
     ([*CONTROLLED, "--K1", "1 kN*m/rad", "--period", "0.1"], "--period = 0.1: must be given with"),
+    (["simulate", *AT_RIG, "--duration", "60"], "'60 s', or '21.0998 s' for the dimensionless 60"),
+    (["simulate", *AT_RIG, "--every", "1"], "'1 s', or '0.351664 s' for the dimensionless 1"),
+    (["simulate", *AT_RIG, "--initial", "dx=1"], "'1 m/s', or '0.00762266 m/s' for the"),
+    (["simulate", *AT_RIG, "--initial", "dtheta=1 m/h"], "--initial dtheta = '1 m/h': must be a"),
+    (["simulate", *AT_RIG, "--initial", "y=1 m"], "of states x, dx, theta, dtheta"),
+    (["simulate", *AT_RIG, "--change", "t=5,speed=100 rpm"], "--change t = 5: must be given with"),
+    (["simulate", *AT_RIG, "--change", "t=5 s,psi=9"], "with rock-strength and its unit in place"),
+    (["simulate", *AT_RIG, "--change", "t=5 s,speed=9"], "--change speed"),
+    ([*CONTROLLED, "--K1", "1 kN*m/rad", "--activation", "3"], "'3 s', or '1.05499 s' for the"),
+    ([*CONTROLLED, "--K1", "1 kN*m/rad", "--noise", "dtheta=1"], "--noise dtheta = 1: must be"),
+    (["compare", *AT_RIG, "--duration", "60"], "'60 s', or '21.0998 s' for the dimensionless 60"),
+    (["compare", *AT_RIG, "--initial", "dx=1"], "--initial dx = 1: must be given with its unit"),
+    (["map", *AT_RIG[:2], "--duration", "60"], "--duration = 60: must be given with its unit"),
     (["analyze", *AT_RIG, "--structure", "p", "--K1", "-3"], "'-3 N*m/rad', or '-2814 N*m/rad'"),
     (["design", *AT_RIG, "--bound", "K1=-3:3"], "'-3 N*m/rad', or '-2814 N*m/rad'"),
     (["design", *AT_RIG, "--structure", "pd", "--bound", "K1=-3:3 kN*m/rad"], "each of K1_1 (N*m"),
@@ -163,6 +176,24 @@ BAD = [
     (["simulate", "--floquet", "--delta0", "0.5", "--duration", "50"], "run = 50 time units"),
     (["invent"], "invent"),
 ]
+
+
+def test_what_was_typed_in_units_is_what_the_run_does(capsys):
+    """An initial motion of a rig in its units is that of the dimensionless run."""
+    rig, scale = table1(), 0.351664
+    units = ("--initial", "dx=10 m/h, dtheta=-20 rpm, theta=0.1", "--duration", "7.0333 s")
+    _, out, _ = run(capsys, "simulate", *AT_RIG, *units, "--json")
+    in_units = json.loads(out)
+    assert rig.time_scale == pytest.approx(scale, rel=1e-5)
+    dx = 10.0 / 3600.0 / (rig.axial_scale / rig.time_scale)
+    dtheta = -20.0 * math.pi / 30.0 * rig.time_scale
+    found = simulate(
+        RigPoint(rig, rotary_speed=4.0 * math.pi, penetration_rate=20.0 / 3600.0),
+        duration=7.0333 / rig.time_scale,
+        initial={"dx": dx, "dtheta": dtheta, "theta": 0.1},
+    )
+    assert in_units["bit_speed_min"] == pytest.approx(found.summary.bit_speed_min, rel=1e-9)
+    assert in_units["delay_max"] == pytest.approx(found.summary.delay_max, rel=1e-9)
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD)

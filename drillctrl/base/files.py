@@ -17,7 +17,10 @@ def check_regular(path: str | Path, limit: int) -> None:
 
     Devices and pipes may never end.
     """
-    found = os.stat(path)
+    try:
+        found = os.stat(path)
+    except ValueError:
+        raise OSError(errno.EINVAL, "not a name of a file") from None
     if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "not a regular file")
     if found.st_size > limit:

@@ -57,6 +57,7 @@ DAMPING = Dimension("an axial damping", "N*s/m", "'15.6 kN*s/m' or '1070 lbf*s/f
 TORSIONAL_DAMPING = Dimension(
     "a torsional damping", "N*m*s/rad", "'32.9 N*m*s/rad' or '24.3 ft*lbf*s/rad'"
 )
+ANGLE = Dimension("an angle", "rad", "'0.1 rad' or '5 deg'")
 NUMBER = Dimension("a plain number", "", "'0.6'")
 DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
 LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")

@@ -37,8 +37,10 @@ ENDINGS = (".html", ".csv", ".json")
     help="Gains from elsewhere, such as paper=case2:-5.03,-4.91:-1.67,-0.31; may be repeated.",
 )
 @click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
-@click.option("--initial", default="dx=1,dtheta=1", show_default=True, help="Disturbance at t = 0.")
-@click.option("--duration", type=float, default=200.0, show_default=True, help="Of simulations.")
+@click.option(
+    "--initial", help="Disturbance (default dx=1,dtheta=1); with a rig 'dx=1 m/h,dtheta=5 rpm'."
+)
+@click.option("--duration", metavar="TIME", help="Of simulations (default 200); with a rig '60 s'.")
 @click.option("--sort", default="spectral_abscissa", show_default=True, help="Measure to sort by.")
 @trials_option("all")
 @click.option("--no-charts", is_flag=True, help="Leave out the stable areas.")
@@ -49,8 +51,8 @@ def compare_command(
     structures: str,
     given: tuple[str, ...],
     bound: tuple[str, ...],
-    initial: str,
-    duration: float,
+    initial: str | None,
+    duration: str | None,
     sort: str,
     trials: str,
     no_charts: bool,
@@ -88,20 +90,22 @@ def compare_command(
     tried = wants_trials(trials)
     where = read_point(point)
     candidates = [read_given(text, where) for text in given]
-    from drillctrl.cli.scenario import read_numbers
+    from drillctrl.cli.scenario import read_disturbance, read_duration
+    from drillctrl.drilling.point import RigPoint
     from drillctrl.drilling.structures import preset_structure
     from drillctrl.studies.compare import REGION, compare
 
     # Its gains are those of all presets.
     every = preset_structure("case2")
+    rig = where.rig if isinstance(where, RigPoint) else None
     with open_progress() as progress:
         result = compare(
             where,
             names,
             given=candidates,
             bounds=read_bounds(bound, every, scales_at(where, every)),
-            disturbance=read_numbers("--initial", initial, "dx=1,dtheta=1"),
-            duration=duration,
+            disturbance=read_disturbance(initial, rig),
+            duration=read_duration(duration, rig),
             region=None if no_charts else REGION,
             sort=sort,
             trials=tried,

@@ -66,10 +66,8 @@ _COUNTS = (15, 12)
 )
 @click.option(
     "--duration",
-    default="200",
-    show_default=True,
     metavar="TIME",
-    help="Of each run; dimensionless, with a rig also '70 s'.",
+    help="Of each run: dimensionless (default 200), with a rig '70 s'.",
 )
 @click.option("--workers", type=int, help="Processes (default: one for each core).")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster, such as tcp://host:8786.")
@@ -88,7 +86,7 @@ def map_command(
     y_axis: str | None,
     refine: int,
     starts: str,
-    duration: str,
+    duration: str | None,
     workers: int | None,
     scheduler: str | None,
     as_json: bool,

@@ -27,11 +27,17 @@ def check_folder(parameter: str, path: str | None) -> None:
     if path is None:
         return
     folder = Path(path).absolute().parent
-    if not folder.is_dir():
+    try:
+        # Names that are too long are refused by the system only when it looks.
+        there, taken = folder.is_dir(), Path(path).is_dir()
+    except OSError as error:
+        wanted = f"a file that can be written ({error.strerror})"
+        raise InputError(parameter, path, wanted) from None
+    if not there:
         raise InputError(parameter, path, "in a folder that exists")
     if not os.access(folder, os.W_OK):
         raise InputError(parameter, path, "in a folder that can be written to")
-    if Path(path).is_dir():
+    if taken:
         raise InputError(parameter, path, "a file, not a folder")
 
 

@@ -26,7 +26,7 @@ def read_quantity(option: str, text: str, dimension: Dimension, unit: float | No
     ------
     InputError
         If there is a unit without a rig, or none with one: a bare number could be meant in
-        SI or dimensionless. Zero is zero in both.
+        SI or dimensionless. Zero is zero in both, and an angle is the same.
     """
     from drillctrl.base import units
 
@@ -37,7 +37,7 @@ def read_quantity(option: str, text: str, dimension: Dimension, unit: float | No
             wanted = "a dimensionless number, or a rig to go with its unit"
             raise InputError(option, text, wanted) from None
         return units.to_si(option, text, dimension)
-    if unit is None or bare == 0.0:
+    if unit is None or unit == 1.0 or bare == 0.0:
         return bare
     both = f"'{text} {dimension.unit}', or '{bare * unit:.6g} {dimension.unit}'"
     raise InputError(option, text, f"given with its unit: {both} for the dimensionless {text}")

@@ -63,7 +63,7 @@ def controller_options(command: Command) -> Command:
         *_SURROUNDINGS,
         click.option(
             "--noise", default="", metavar="NAME=DEVIATION",
-            help="On each sample, such as theta=0.01,dtheta=0.1.",
+            help="On each sample: theta=0.01,dtheta=0.1; with a rig 'dtheta=1 rpm'.",
         ),
         click.option("--seed", type=int, default=0, show_default=True, help="Of the noise."),
     ]  # fmt: skip
@@ -82,15 +82,52 @@ def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
     return numbers
 
 
+def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[str, float]:
+    """Return dimensionless numbers of states by name; with a rig each carries its unit.
+
+    Names are those of the bit, ``x``, ``theta`` and their rates, or of a further coordinate
+    that begins so, which is of the same kind.
+    """
+    if rig is None:
+        return read_numbers(option, text, example)
+    from drillctrl.base import units
+    from drillctrl.drilling.quantities import si_scale
+
+    kinds = (
+        ("dtheta", "angular_rate", units.ROTARY_SPEED),
+        ("theta", "angle", units.ANGLE),
+        ("dx", "axial_rate", units.SPEED),
+        ("x", "length", units.LENGTH),
+    )
+    numbers = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals:
+            raise InputError(option, text, f"of the form {example}")
+        for start, quantity, dimension in kinds:
+            if name.startswith(start):
+                unit = si_scale(quantity, rig)
+                numbers[name] = read_quantity(f"{option} {name}", value, dimension, unit) / unit
+                break
+        else:
+            raise InputError(option, text, "of states x, dx, theta, dtheta")
+    return numbers
+
+
 def read_time(option: str, text: str, rig: Rig | None) -> float:
-    """Return dimensionless time from a number, or from seconds of a rig."""
+    """Return dimensionless time from a number, or of a rig from a time with its unit."""
     from drillctrl.base import units
 
-    try:
-        return float(text)
-    except ValueError:
-        unit = None if rig is None else rig.time_scale
-        return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
+    unit = None if rig is None else rig.time_scale
+    return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
+
+
+def read_disturbance(text: str | None, rig: Rig | None) -> dict[str, float]:
+    """Return what steady drilling is disturbed by, as it is usual if nothing was typed."""
+    if text is None:
+        return {"dx": 1.0, "dtheta": 1.0}
+    example = "dx=1,dtheta=1, or with a rig 'dx=1 m/h,dtheta=5 rpm'"
+    return read_states("--initial", text, example, rig)
 
 
 def read_scenario(
@@ -113,8 +150,7 @@ def read_scenario(
     later = tuple(_read_change(text, point, rig) for text in changes)
     if start != "steady" and start not in START_NAMES:
         raise InputError("--start", start, f"steady, {', '.join(START_NAMES)}")
-    usual = "dx=1,dtheta=1" if start == "steady" else ""
-    kick = read_numbers("--initial", usual if initial is None else initial, "dx=1,dtheta=1")
+    kick = {} if initial is None and start != "steady" else read_disturbance(initial, rig)
     if start in ("steady", "rest", "stick"):
         return Scenario(start, kick, later)
     if initial is not None:
@@ -165,8 +201,11 @@ def _read_change(text: str, point: OperatingPoint, rig: Rig | None) -> Any:
         elif name in in_rig_units:
             field, dimension, unit = in_rig_units[name]
             arguments[field] = units.to_si(f"--change {name}", value, dimension) / unit
-        elif name in plain:
+        elif name in plain and rig is None:
             arguments[plain[name]] = read_numbers("--change", f"{name}={value}", _CHANGE)[name]
+        elif name in plain:
+            instead = {"omega0": "speed", "v0": "rop", "psi": "rock-strength"}[name]
+            raise InputError("--change", text, f"with {instead} and its unit in place of {name}")
         else:
             raise InputError("--change", text, _CHANGE)
     return Change(**arguments)
@@ -219,7 +258,8 @@ def read_controller(
         given["activation"] = read_time("--activation", options["activation"], rig)
     given.update(read_surroundings(options, rig))
     if options["noise"]:
-        given["noise"] = read_numbers("--noise", options["noise"], "theta=0.01,dtheta=0.1")
+        example = "theta=0.01,dtheta=0.1, or with a rig 'theta=0.01 rad,dtheta=1 rpm'"
+        given["noise"] = read_states("--noise", options["noise"], example, rig)
         given["seed"] = options["seed"]
     if options["delay"] != "fixed":
         given["delay"] = options["delay"]
@@ -269,6 +309,7 @@ def _from_table(
     return scheduled(table, point, scenario, duration=duration, **given)
 
 
-def read_duration(text: str, rig: Rig | None) -> float:
-    """Return the dimensionless length of a run."""
-    return checked_number("duration", read_time("--duration", text, rig), 0.0, open_low=True)
+def read_duration(text: str | None, rig: Rig | None, usual: float = 200.0) -> float:
+    """Return the dimensionless length of a run, as it is usual if none was typed."""
+    length = usual if text is None else read_time("--duration", text, rig)
+    return checked_number("duration", length, 0.0, open_low=True)

@@ -47,9 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--duration",
     metavar="TIME",
-    default="200",
-    show_default=True,
-    help="Dimensionless, as every TIME; with a rig also '60 s'.",
+    help="Dimensionless, as every TIME (default 200); with a rig '60 s'.",
 )
 @click.option(
     "--start",
@@ -64,7 +62,8 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--initial",
-    help="Perturbation at t = 0: x, dx, theta, dtheta (default dx=1,dtheta=1; none from rest).",
+    help="Perturbation at t = 0: x, dx, theta, dtheta (default dx=1,dtheta=1; none from rest); "
+    "with a rig 'dx=1 m/h,dtheta=5 rpm'.",
 )
 @click.option(
     "--change",
@@ -94,7 +93,7 @@ def simulate_command(
     model: str,
     cutting: str,
     backwards: str,
-    duration: str,
+    duration: str | None,
     start: str,
     starts: str | None,
     initial: str | None,

@@ -299,7 +299,8 @@ def reduced_loops(
         some = A0[rest] if z == 0.0 else A0[rest] + z * left[rest] @ right[rest]
         values, vectors = np.linalg.eig(some)
         inverse = inverses(vectors)
-        condition = np.linalg.norm(inverse, axis=(1, 2))
+        with np.errstate(over="ignore"):
+            condition = np.linalg.norm(inverse, axis=(1, 2))
         safe = np.flatnonzero(condition < _SAFE_CONDITION)
         place = rest[safe]
         driven, seen = inverse[safe] @ left[place], right[place] @ vectors[safe]

@@ -38,6 +38,8 @@ class Simulation(Trace):
     ----------
     controller : Controller or None
     scenario : Scenario
+    backwards : str
+        What becomes of a bit that turns back, as given to `simulate`.
     rtol, atol : float
         Tolerances of a step.
     rejected, evaluations : int
@@ -48,6 +50,7 @@ class Simulation(Trace):
 
     controller: Controller | None
     scenario: Scenario
+    backwards: str
     rtol: float
     atol: float
     rejected: int

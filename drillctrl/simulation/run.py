@@ -249,6 +249,7 @@ def simulate(
         scenario=scenario,
         model=model,
         cutting=cutting,
+        backwards=backwards,
         duration=duration,
         rtol=rtol,
         atol=atol,

@@ -16,6 +16,8 @@ from drillctrl.delay.system import DelaySystem
 _EXPONENT_LIMIT = 300.0
 # Below so many states a tighter bound saves nothing.
 _FEW_STATES, _SAFE_CONDITION = 20, 1e6
+# Numbers in one temporary array: 8 MB of complex ones.
+_CHUNK = 500_000
 
 
 def matrix(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
@@ -62,7 +64,11 @@ def log_derivative_at(system: DelaySystem, s: complex) -> complex:
 
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
-    return trace_ratio(*matrix_and_derivative(system, np.asarray(s, dtype=complex)))
+    points = np.asarray(s, dtype=complex)
+    if points.ndim != 1 or points.size * system.order**2 <= _CHUNK:
+        return trace_ratio(*matrix_and_derivative(system, points))
+    parts = np.array_split(points, points.size * system.order**2 // _CHUNK + 1)
+    return np.concatenate([trace_ratio(*matrix_and_derivative(system, part)) for part in parts])
 
 
 def trace_ratio(delta: ComplexArray, slope: ComplexArray) -> ComplexArray:
@@ -134,3 +140,16 @@ def perron_bounds(
     growth = np.exp(np.minimum(-right_of * delays, _EXPONENT_LIMIT))[:, None, None]
     total = np.abs(A0) + np.abs(A1) * growth
     return np.asarray(np.abs(np.linalg.eigvals(total)).max(axis=1) * (1.0 + 1e-9) + 1e-12)
+
+
+def weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
+    """S(s) = ‖A0‖ + Σ ‖Ai‖ |exp(−sτi)|, what relative changes are measured against."""
+    total = np.full(s.shape, system.norms[0])
+    for delay, norm in zip(system.delays, system.norms[1:], strict=True):
+        total += norm * np.exp(np.minimum(-s.real * delay, _EXPONENT_LIMIT))
+    return np.asarray(np.maximum(total, 1e-300))
+
+
+def smallest_singular(system: DelaySystem, s: ComplexArray) -> FloatArray:
+    """Smallest singular value of Δ for every s: 0 at a root."""
+    return np.asarray(np.linalg.svd(matrix(system, s), compute_uv=False)[..., -1])

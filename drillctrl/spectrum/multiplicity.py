@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.arrays import ComplexArray
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 
@@ -28,6 +28,8 @@ CLOSE = 0.2
 # Share of a cluster's spread by which its members may be off before the circle's are taken.
 _ASTRAY = 1e-2
 _LARGEST_CLUSTER = 24
+# A count on a circle that is off by more is disturbed by a root close to it.
+_SHARP_COUNT = 1e-8
 
 
 @dataclass(frozen=True)
@@ -90,23 +92,10 @@ def resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root
     return tuple(sorted(roots, key=lambda root: (-root.rightmost, root.imag)))
 
 
-def _weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
-    """S(s) = ‖A0‖ + Σ ‖Ai‖ |exp(−sτi)|, what relative changes are measured against."""
-    total = np.full(s.shape, system.norms[0])
-    for delay, size in zip(system.delays, system.norms[1:], strict=True):
-        total += size * np.exp(np.minimum(-s.real * delay, 300.0))
-    return np.asarray(np.maximum(total, 1e-300))
-
-
-def _smallest_singular(system: DelaySystem, s: ComplexArray) -> FloatArray:
-    values = np.linalg.svd(characteristic.matrix(system, s), compute_uv=False)
-    return np.asarray(values[..., -1])
-
-
 def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
     delta, slope = characteristic.matrix_and_derivative(system, np.array(value))
     left, sizes, right = np.linalg.svd(delta)
-    weight = float(_weight(system, np.array([value]))[0])
+    weight = float(characteristic.weight(system, np.array([value]))[0])
     turn = abs(left[:, -1].conj() @ slope @ right[-1].conj())
     return Root(
         float(value.real),
@@ -127,6 +116,8 @@ def _cluster(
     mirrored = [(i, s[i]) for i in left] + [(i, s[i].conjugate()) for i in left if s[i].imag > 0]
     mirrored.sort(key=lambda item: abs(item[1] - s[first]))
     values = np.array([value for _, value in mirrored])
+    settled = np.delete(s, left)
+    beside = np.abs(np.concatenate([settled, settled.conj()]) - s[first]).min(initial=math.inf)
     # Roots of a chain lie 2π/τ apart.
     close = CLOSE * (1.0 + abs(s[first]))
     close = min(close, 2.0 / system.max_delay) if system.delays else close
@@ -138,7 +129,8 @@ def _cluster(
             centre = complex(centre.real, 0.0)
         spread = float(np.abs(members - centre).max())
         outside = float(np.abs(values[size:] - centre).min()) if values.size > size else math.inf
-        if outside < 4.0 * spread:
+        outside = min(outside, float(beside) - abs(centre - s[first]))
+        if outside <= 4.0 * spread:
             continue
         # A wide circle: the mean is as exact as κ ε divided by its radius to the k − 1.
         wide = min(0.2 * (1.0 + abs(centre)), 0.3 / system.max_delay if system.delays else 1.0)
@@ -154,7 +146,7 @@ def _change(
 ) -> float:
     """Return the relative change of the coefficients that makes members of a cluster one."""
     at = centre + tight
-    sizes = _smallest_singular(system, at) / _weight(system, at)
+    sizes = characteristic.smallest_singular(system, at) / characteristic.weight(system, at)
     return float((np.abs(1.0 - ratio) * sizes).max())
 
 
@@ -187,13 +179,17 @@ def _multiple_root(
     worst = [int(np.abs(1.0 - ratio).argmax())]
     if _change(system, centre, tight[worst], ratio[worst]) > 1e3 * MULTIPLICITY_TOLERANCE:
         return None
-    ring = radius * _CIRCLE
-    slope = characteristic.log_derivative(system, centre + ring)
-    count = complex((slope * ring).mean())
+    for reach in (radius, 0.5 * radius, 0.25 * radius):
+        ring = reach * _CIRCLE
+        slope = characteristic.log_derivative(system, centre + ring)
+        count = complex((slope * ring).mean())
+        # A root that was not gathered may stand close outside, and would pull at the mean.
+        if abs(count - size) < _SHARP_COUNT or reach < 8.0 * spread:
+            break
     if not abs(count - size) < 0.2:
         return None
     shift = complex((slope * ring * ring).mean()) / size
-    if not abs(shift) < radius:
+    if not abs(shift) < reach:
         return None
     refined = complex(centre.real + shift.real, centre.imag + shift.imag if centre.imag else 0.0)
     change = _change(system, refined, tight, ratio)
@@ -206,8 +202,11 @@ def _multiple_root(
         astray = np.abs(exact[:, None] - members[None, :]).min(axis=1).max()
         if astray > _ASTRAY * spread:
             members, spread = exact, float(np.abs(exact - exact.mean()).max())
-    outer = _smallest_singular(system, refined + ring)
-    weight = float(_weight(system, np.array([refined]))[0])
+    outer = characteristic.smallest_singular(system, refined + ring)
+    weight = float(characteristic.weight(system, np.array([refined]))[0])
+    residual = float(characteristic.smallest_singular(system, np.array([refined]))[0]) / weight
+    if residual > MULTIPLICITY_TOLERANCE:
+        return None
     rounding = change <= ROUNDING_TOLERANCE
     return Root(
         refined.real,
@@ -215,7 +214,7 @@ def _multiple_root(
         size,
         spread,
         refined.real if rounding else float(members.real.max()),
-        float(_smallest_singular(system, np.array([refined]))[0]) / weight,
-        weight * radius**size / float(outer.min()),
+        residual,
+        weight * reach**size / max(float(outer.min()), 1e-300),
         True,
     )

@@ -37,6 +37,8 @@ _NARROW = 1e-3
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
+# The same of many states, as a multiple of them: a point of a count costs their cube.
+_MANY, _LARGEST_SHARE = 30, 24
 _SMALLEST = 100
 # Roots that are iterated on together.
 _FEW = 100
@@ -63,7 +65,9 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
     ranks = sum(left.shape[1] for left, _ in system.factors)
 
     def in_reach(degree: int) -> bool:
-        return degree < MAX_DEGREE and (system.order + degree * ranks <= _LARGEST or degree <= 8)
+        size = system.order + degree * ranks
+        largest = _LARGEST_SHARE * system.order if system.order >= _MANY else _LARGEST
+        return degree < MAX_DEGREE and size <= largest
 
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
@@ -104,7 +108,10 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
             start = inside[inside.real >= floor - _WIDE * (1.0 + np.abs(inside))]
             s, done = polish(system, start)
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
-        if (done & ~strayed).all():
+        lost = ~done | strayed
+        # Far left of what is wanted the collocation may be rough.
+        if not (lost & ((start.real >= floor) | (s.real >= floor))).any():
+            s, done = s[~lost], done[~lost]
             order = np.argsort(-s.real, kind="stable")
             return s[order], done[order], floor
         degree *= 2

@@ -43,23 +43,65 @@ def test_a_regular_file_may_have_its_limit(tmp_path):
         check_regular(tmp_path / "some", 4)
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "latin-1", "ascii"])
-@pytest.mark.parametrize(
-    "arguments",
-    [("analyze",), ("analyze", "--omega0", "-1"), ("--help",), ("design", "--help")],
-)
-def test_nothing_is_lost_in_an_old_encoding(encoding, arguments, monkeypatch):
+RIG = ("--rig", "table1", "--speed", "150 rpm", "--rop", "20 m/h")
+# Every verb, so that it has something to say with letters that the encodings lack.
+VERBS = {
+    "analyze": (*RIG, "--structure", "p", "--K1", "-2 kN*m/rad"),
+    "design": ("--structure", "p", "--trials", "none"),
+    "chart": ("--x", "omega0=5:9", "--y", "delta0=0:2"),
+    "map": ("--x", "omega0=8:9:2", "--y", "delta0=1:2:2", "--duration", "1", "--starts", "kick",
+            "--workers", "1"),
+    "compare": ("--structures", "p", "--no-charts", "--trials", "none", "--duration", "1"),
+    "simulate": ("--duration", "2"),
+    "bit": RIG,
+    "table": ("--omega0", "8:9:2", "--delta0", "1:2:2", "--structure", "p", "--trials", "none",
+              "--out", "gains.csv"),
+    "reproduce": ("equations",),
+    "rig": ("check", "table1"),
+}  # fmt: skip
+
+
+def _told(encoding, arguments, monkeypatch):
     from drillctrl import cli
 
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
     monkeypatch.setattr(sys, "stdout", out)
     monkeypatch.setattr(sys, "stderr", err)
-    with pytest.raises(SystemExit):
+    with pytest.raises(SystemExit) as stop:
         cli.main(list(arguments))
     out.flush()
     err.flush()
-    text = (out.buffer.getvalue() + err.buffer.getvalue()).decode("utf-8")
-    assert "ω0" in text or "omega0" in text or "Usage" in text
+    # A stream is either what it was, or UTF-8 where that lacks letters.
+    return stop.value.code, [
+        stream.buffer.getvalue().decode(stream.encoding) for stream in (out, err)
+    ]
+
+
+def test_all_verbs_are_there():
+    from drillctrl import cli
+
+    assert set(VERBS) == set(cli.cli.commands)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "latin-1"])
+@pytest.mark.parametrize("verb", VERBS)
+def test_no_verb_loses_anything_in_an_old_encoding(encoding, verb, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    status, (out, err) = _told(encoding, (verb, *VERBS[verb]), monkeypatch)
+    assert status == 0, err
+    assert "Traceback" not in err
+    assert not out.isascii()
+    assert "\\u" not in out
+    assert "?" not in out
+    assert _told(encoding, (verb, "--nonsense"), monkeypatch)[0] == 2
+    assert _told(encoding, (verb, "--help"), monkeypatch)[0] == 0
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "latin-1", "ascii"])
+@pytest.mark.parametrize("arguments", [("analyze",), ("analyze", "--omega0", "-1"), ("--help",)])
+def test_nothing_is_lost_in_an_old_encoding(encoding, arguments, monkeypatch):
+    text = "".join(_told(encoding, arguments, monkeypatch)[1])
+    assert "ω0" in text or "omega0" in text
     assert "Traceback" not in text
 
 
