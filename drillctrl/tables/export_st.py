@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Unpack
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
@@ -11,17 +13,26 @@ from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.quantities import SI_UNITS
 from drillctrl.tables.reserved import is_identifier
 from drillctrl.tables.sampled import sampled_controller
+from drillctrl.tables.settings import STATUS_BITS, Options
 from drillctrl.tables.table import GainTable
 
 # What the block declares, so that its own name is none of these.
 _VARIABLES = """
-    Measured Place DelayTime Enable Command Vouched PastSamples NewestSample ActiveSamples
+    Measured Place DelayTime Enable TighterLimit ElapsedTime OtherCommand Command Vouched
+    StatusBits PastSamples NewestSample ActiveSamples MissingSamples EqualSamples TrustSamples
+    ReleaseSamples SampleSeen SampleGood SampleEqual SampleLate SampleLost SignalFrozen
+    GainTrusted GoodSample GoodPlace GoodDelay TrustedGains PastValue LimitNow StartCommand
+    WantedCommand RampShare LargestInput FadeSamples HoldSamples FrozenSamples FastestChange
     GainValues CellShare CellLow AxisIndex EntryIndex CornerA CornerB CornerC CellKind NodeIndex
     WholeSamples NearSample FarSample CornerWeight PartSample SamplesBack InsideTable
     SamplePeriod CommandLimit RampSamples RingDepth TicksA TicksB TicksC NodeGains CellGains
     CellKinds
 """
 VARIABLES = frozenset(_VARIABLES.split())
+_DIALECTS = (
+    "IEC 61131-3, second edition, Structured Text without extensions of a vendor.",
+    "Structured Control Language of Siemens (TIA Portal, S7-1500), as an external source.",
+)
 
 
 def export_st(
@@ -30,7 +41,7 @@ def export_st(
     *,
     period: float,
     limit: float,
-    ramp: int | None = None,
+    **options: Unpack[Options],
 ) -> Path:
     """Write one function block: lookup, delay line, saturation, soft switch-on.
 
@@ -42,13 +53,13 @@ def export_st(
     table : GainTable
         Over dimensionless groups, or in rig units: then the lookup takes the grid's axes in SI.
     path : str or Path
-        The file, ending in .st.
+        The file: ending in .scl for the Structured Control Language of Siemens, else in .st.
     period : float
         Sampling period, dimensionless or s.
     limit : float
         Largest |u|, dimensionless or N·m.
-    ramp : int, optional
-        Samples of the switch-on, 0 for none; by default as many as the longest delay has.
+    **options
+        Of `Options`: ramp, outside, fade, hold, watchdog, rate_limit, release.
 
     Raises
     ------
@@ -58,23 +69,31 @@ def export_st(
     """
     name = Path(path).stem
     check_st_name(name)
-    controller = sampled_controller(table, name, period, limit, ramp)
+    controller = sampled_controller(table, name, period, limit, options)
+    settings = controller.settings
     structure, plant, rig = table.structure, table.grid.plant, table.grid.rig
     gain_units = rig_gain_units(structure, plant, rig)
     si = {name: SI_UNITS[plant.quantity(name)] for name in (*structure.outputs, *structure.inputs)}
-    outputs, depth = len(structure.outputs), int(controller.words["depth"])
+    outputs, scl = len(structure.outputs), Path(path).suffix.lower() == ".scl"
     sizes = dict(zip("ABC", map(len, controller.axes), strict=True))
     arrays = {f"Ticks{letter}": ticks for letter, ticks in zip("ABC", controller.axes, strict=True)}
     arrays["NodeGains"] = controller.node_gains
     # An array of no elements is not Structured Text.
     arrays["CellGains"] = controller.cell_gains or (0.0,)
-    words = controller.words | {
+    words = {
+        **controller.words,
+        **settings._asdict(),
         "outputs": outputs,
         "entries": 2 * outputs,
-        "depth": depth,
+        "bits": STATUS_BITS,
+        "fading": settings.fading,
+        "ends": [[_number(value) for value in pair] for pair in controller.ends()],
+        "scl": scl,
+        "dialect_words": _DIALECTS[scl],
         "sizes": sizes,
-        "period": _number(controller.period),
-        "limit": _number(controller.limit),
+        "period": _number(settings.period),
+        "limit": _number(settings.limit),
+        "rate": "" if settings.rate is None else _number(settings.rate),
         "reference": controller.reference,
         "arrays": {label: [_number(v) for v in values] for label, values in arrays.items()},
         "cell_mode": controller.cell_mode,
@@ -89,8 +108,17 @@ def export_st(
         if gain_units
         else "dimensionless",
     }
-    write_text(path, filled("drillctrl.tables", "controller.st.j2", **words))
+    text = filled("drillctrl.tables", "controller.st.j2", **words)
+    write_text(path, _with_marks(text) if scl else text)
     return Path(path)
+
+
+def _with_marks(text: str) -> str:
+    """Return a block with the mark # before each variable in its statements."""
+    declared, body = text.split("\nBEGIN\n")
+    return f"{declared}\nBEGIN\n" + re.sub(
+        rf"\b({'|'.join(sorted(VARIABLES, key=len, reverse=True))})\b", r"#\1", body
+    )
 
 
 def check_st_name(name: str) -> None:
