@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from drillctrl import InputError
+from drillctrl import Change, InputError, OperatingPoint, Scenario, simulate
 from drillctrl.tables.export_c import export_c
+from drillctrl.tables.scheduling import course, scheduled
 from drillctrl.tables.settings import STATUS_BITS
 
 from .exported import InC, InPython, InScl, Interpreted, Translated, hostile, matiec
@@ -126,6 +127,44 @@ def test_where_the_table_does_not_vouch_its_last_gains_fade_or_stay(small, tmp_p
         one.init()
         first = [one.step([wave(k)], (10.0, 60.0, 14.0), DELAY) for k in range(50)]
         assert first == [0.0] * 50
+
+
+@pytest.mark.parametrize("outside", ["fade", "hold"])
+def test_the_simulator_fades_and_holds_as_the_exported_controller_does(small, tmp_path, outside):
+    """Over a transient on which the table is left and entered again, to a delay of 11 samples."""
+    point = OperatingPoint(10.0, 2.5, 14.0)
+    changes = (Change(35.0, omega0=160.0 / 11.0), Change(35.7, omega0=10.0), Change(37.0, psi=15.0))
+    scenario = Scenario(initial={"dtheta": 0.5}, changes=changes)
+    start, period = 30.0, point.delay / 16
+    options = {"period": period, "limit": LIMIT, "rate_limit": 40.0}
+    exported = InC(small, tmp_path, ramp=0, fade=20, outside=outside, **options)
+    control = scheduled(
+        small, point, scenario, activation=start, fade=20, outside=outside, duration=40.0, **options
+    )
+    run = simulate(point, control, scenario=scenario, duration=40.0)
+    count = int(9.5 / period)
+    times = start + np.arange(-100, count) * period
+    theta, held = run.at(times).theta, run.at(times[100:] + period / 2).torque
+    # What the top end does otherwise than at the start is taken off.
+    rest = theta - commanded_turn(scenario, point, times)
+    places = course(point, scenario, times + 2e-9)
+    delays = [2.0 * math.pi / (point.blades * omega0) for omega0 in places[:, 0]]
+    u, seen = [], 0
+    for k, (y, at, delay) in enumerate(zip(rest, places, delays, strict=True)):
+        u.append(exported.step([y], at, delay, k >= 100))
+        seen |= exported.status
+    assert seen & BIT["OUTSIDE"]
+    assert np.abs(np.array(u[100:]) - held).max() < 1e-12
+    assert np.ptp(held) > 0.1
+
+
+def commanded_turn(scenario, point, times):
+    """Return by how much the top end has turned further than at the start's speed."""
+    turned = np.zeros(len(times))
+    knots = [(change.time, change.omega0) for change in scenario.changes if change.omega0]
+    for (time, after), end in zip(knots, [*(t for t, _ in knots[1:]), 1e9], strict=True):
+        turned += (after - point.omega0) * np.clip(times - time, 0.0, end - time)
+    return turned
 
 
 def test_what_units_have_rounded_is_inside(small, on_rig, tmp_path):
