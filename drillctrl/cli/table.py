@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from drillctrl.tables.grid import Grid
     from drillctrl.tables.table import GainTable
 
-CONTROLLERS = (".c", ".st", ".scl")
+CONTROLLERS = (".c", ".st", ".scl", ".fmu")
 # What may go with a table that is there already.
 _OPTIONS = ("ramp", "outside", "fade", "hold", "watchdog", "rate_limit", "release")
-_CONTROLLER = ("period", "limit", "real", *_OPTIONS)
+_CONTROLLER = ("period", "limit", "real", "fmi", *_OPTIONS)
 _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot")
 
 
@@ -67,7 +67,9 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
     "--from", "source", type=click.Path(), metavar="FILE", help="A saved table instead of a design."
 )
 @click.option(
-    "--period", metavar="TIME", help="Of a .c or .st controller, such as 0.01; '10 ms' with a rig."
+    "--period",
+    metavar="TIME",
+    help="Of a controller (.c …), such as 0.01; '10 ms' with a rig.",
 )
 @click.option("--limit", metavar="TORQUE", help="Its largest |u|, such as 5; '5 kN*m' with a rig.")
 @click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
@@ -84,6 +86,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
     "--release", type=int, metavar="SAMPLES", help="Of its switch-off (default: at once)."
 )
 @click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
+@click.option("--fmi", help="Standard of an .fmu: 3.0 (default) or 2.0.")
 @click.option(
     "--require-stable", is_flag=True, help="Exit with 3 if a node is not stable or refused."
 )
@@ -91,7 +94,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--out",
     type=click.Path(),
-    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h), .st or .scl.",
+    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h), .st, .scl or .fmu.",
 )
 @click.option("--plot", type=click.Path(), help="Draw gains and α: FILE.png, .svg, .pdf.")
 @click.pass_context
@@ -262,8 +265,11 @@ def _check_out(
         if controller[name] is None:
             raise InputError(name, "(missing)", f"given for {out}")
     given = {name: controller[name] for name in _OPTIONS if controller[name] is not None}
+    for name, goes_with in (("real", ".c"), ("fmi", ".fmu")):
+        if controller[name] is not None and ending != goes_with:
+            raise InputError(name, controller[name], f"left out unless --out ends in {goes_with}")
     with naming("--out", "name"):
-        (check_c_name if ending == ".c" else check_st_name)(Path(out).stem)
+        (check_st_name if ending in (".st", ".scl") else check_c_name)(Path(out).stem)
         checked_settings(
             grid,
             structure,
@@ -274,9 +280,11 @@ def _check_out(
         if ending == ".c":
             check_c_header(Path(out).with_suffix(".h"))
     if controller["real"] is not None:
-        if ending != ".c":
-            raise InputError("real", controller["real"], "left out unless --out ends in .c")
         check_real(controller["real"])
+    if ending == ".fmu":
+        from drillctrl.tables.export_fmu import check_fmu
+
+        check_fmu(Path(out).stem, controller["fmi"] or "3.0")
 
 
 def _write(result: GainTable, out: str, controller: dict[str, Any]) -> None:
@@ -286,6 +294,10 @@ def _write(result: GainTable, out: str, controller: dict[str, Any]) -> None:
         from drillctrl.tables.export_st import export_st
 
         export_st(result, path, **given)
+    elif path.suffix.lower() == ".fmu":
+        from drillctrl.tables.export_fmu import export_fmu
+
+        export_fmu(result, path, **given)
     elif path.suffix.lower() == ".c":
         from drillctrl.tables.export_c import export_c
 
