@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from drillctrl.tables.grid import Grid
     from drillctrl.tables.table import GainTable
 
-CONTROLLERS = (".c", ".st", ".scl", ".fmu")
+CONTROLLERS = (".c", ".st", ".scl", ".xml", ".fmu")
 # What may go with a table that is there already.
 _OPTIONS = ("ramp", "outside", "fade", "hold", "watchdog", "rate_limit", "release")
 _CONTROLLER = ("period", "limit", "real", "fmi", *_OPTIONS)
@@ -94,7 +94,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--out",
     type=click.Path(),
-    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h), .st, .scl or .fmu.",
+    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h), .st, .scl, .xml or .fmu.",
 )
 @click.option("--plot", type=click.Path(), help="Draw gains and α: FILE.png, .svg, .pdf.")
 @click.pass_context
@@ -269,7 +269,7 @@ def _check_out(
         if controller[name] is not None and ending != goes_with:
             raise InputError(name, controller[name], f"left out unless --out ends in {goes_with}")
     with naming("--out", "name"):
-        (check_st_name if ending in (".st", ".scl") else check_c_name)(Path(out).stem)
+        (check_st_name if ending in (".st", ".scl", ".xml") else check_c_name)(Path(out).stem)
         checked_settings(
             grid,
             structure,
@@ -290,7 +290,7 @@ def _check_out(
 def _write(result: GainTable, out: str, controller: dict[str, Any]) -> None:
     path = Path(out)
     given = {name: value for name, value in controller.items() if value is not None}
-    if path.suffix.lower() in (".st", ".scl"):
+    if path.suffix.lower() in (".st", ".scl", ".xml"):
         from drillctrl.tables.export_st import export_st
 
         export_st(result, path, **given)

@@ -200,10 +200,11 @@ class Reader:
         assert not (assigned and name in self.kind.constants), name
         text = f"s.{name}"
         if isinstance(type_, Kind):
-            if self.skip("."):
-                part = self.next("word")
-                return f"{text}.{part}", type_.variables[part][0][0]
-            return text, type_
+            if not self.skip("."):
+                return text, type_
+            part = self.next("word")
+            assert not assigned or part in type_.inputs
+            text, type_ = f"{text}.{part}", type_.variables[part][0]
         if self.skip("["):
             text += f"[{self.typed('DINT')}]"
             self.next("]")
@@ -223,7 +224,7 @@ class Reader:
             sign = self.next()
             other, same = self.expression(level + 1)
             assert type_ == same, (text, sign, other)
-            assert (type_ == "BOOL") == (level < 2), (text, sign, other)
+            assert level == 2 or (type_ == "BOOL") == (level < 2), (text, sign, other)
             assert sign != "MOD" or type_ == "DINT"
             assert sign != "/" or type_ == "LREAL"
             if sign == "MOD":

@@ -138,6 +138,16 @@ def test_options_of_the_arithmetic_and_the_ramp_reach_the_controller(capsys, tmp
     assert "#define RAMP 12\n" in out.read_text()
 
 
+@pytest.mark.parametrize("ending", [".xml", ".scl"])
+def test_dialects_are_chosen_by_the_ending(capsys, tmp_path, ending):
+    out = tmp_path / f"gains{ending}"
+    assert run(capsys, "table", *NODES, "--out", out, "--period", 0.01, "--limit", 5)[0] == 0
+    text = out.read_text()
+    assert ("tc6_0201" in text) == (ending == ".xml")
+    assert ('FUNCTION_BLOCK "gains"' in text) == (ending == ".scl")
+    assert {path.name for path in tmp_path.iterdir()} == {out.name, "gains.vectors.csv"}
+
+
 def test_a_unit_for_co_simulation_and_what_it_does_beside_its_law(capsys, tmp_path):
     out = tmp_path / "g.fmu"
     options = ("--period", 0.01, "--limit", 5, "--fmi", "2.0", "--outside", "hold")
