@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from pathlib import Path
 from typing import Unpack
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import replacing
 from drillctrl.base.templates import filled
+from drillctrl.tables.arithmetic import float_difference, worst_cost
 from drillctrl.tables.interpolation import SLACK
-from drillctrl.tables.sampled import sampled_controller
+from drillctrl.tables.sampled import SampledController, sampled_controller
 from drillctrl.tables.settings import STATUS_BITS, Options
 from drillctrl.tables.table import GainTable
 
@@ -70,7 +72,7 @@ def export_c(
     check_real(real)
     check_c_name(name)
     controller = sampled_controller(table, name, period, limit, options)
-    settings = controller.settings
+    settings, outputs = controller.settings, len(table.structure.outputs)
     header = Path(folder) / f"{name}.h"
     source = Path(folder) / f"{name}.c"
     arrays = {f"axis{i}": ticks for i, ticks in enumerate(controller.axes)}
@@ -82,7 +84,9 @@ def export_c(
     words = {
         **controller.words,
         **settings._asdict(),
-        "outputs": len(table.structure.outputs),
+        "outputs": outputs,
+        "costs": worst_cost(controller, outputs),
+        "rounding": _float_words(controller, table) if real == "float" else (),
         "bits": STATUS_BITS,
         "fading": [f"{name.upper()}_{bit}" for bit in settings.fading],
         "fading_words": ", ".join(settings.fading),
@@ -102,6 +106,19 @@ def export_c(
         for file, template in ((first, "controller.h.j2"), (second, "controller.c.j2")):
             file.write(filled("drillctrl.tables", template, **words).encode("ascii"))
     return header, source
+
+
+def _float_words(controller: SampledController, table: GainTable) -> tuple[str, ...]:
+    """Say in lines by how much float arithmetic differs from double."""
+    names = table.structure.outputs
+    difference, sizes = float_difference(controller, len(names))
+    ranges = ", ".join(f"{size:.3g} of {name}" for name, size in zip(names, sizes, strict=True))
+    text = (
+        f"u differs from that of double arithmetic by at most {difference:.3g} anywhere in the "
+        f"table, for magnitudes up to {ranges}, and in proportion beyond. Where a cell has "
+        "constant gains its border lies within rounding."
+    )
+    return tuple(textwrap.wrap(text, 80))
 
 
 def check_real(real: str) -> None:
