@@ -68,7 +68,7 @@ class Settings(NamedTuple):
     Attributes
     ----------
     period, limit : float
-        Sampling period and largest \\|u\\|, in the units of the table.
+        Sampling period and largest ``|u|``, in the units of the table.
     depth : int
         Samples that the ring holds: the longest delay, what is in between two, and the newest.
     ramp, fade : int

@@ -138,7 +138,10 @@ def test_same_command_as_the_simulator_over_a_stick_slip_transient(small, unit):
         str(unit), start_time=0.0, stop_time=rows["time"][500], step_size=PERIOD,
         output_interval=PERIOD, input=rows, output=["u"],
     )  # fmt: skip
-    assert np.abs(result["u"][1:] - held[: len(result) - 1]).max() < 1e-9
+    # Discrete inputs count from a step on or from the one before, by fmpy's version.
+    found, count = result["u"][2:], len(result) - 2
+    lags = [np.abs(found - held[lag : lag + count]).max() for lag in (0, 1)]
+    assert min(lags) < 1e-9 < max(lags)
 
 
 def test_instances_are_apart_and_are_reset_saved_and_restored(unit):
