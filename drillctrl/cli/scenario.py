@@ -303,10 +303,11 @@ def _from_table(
             omega0, delta0, psi = place
             click.echo(
                 f"drillctrl: note: the table does not vouch for ω0 = {omega0:.4g}, "
-                f"δ0 = {delta0:.4g}, ψ = {psi:.4g} from t = {time:g}",
+                f"δ0 = {delta0:.4g}, ψ = {psi:.4g} from t = {time:g}: "
+                f"the last gains that it vouches for fade to zero",
                 err=True,
             )
-    return scheduled(table, point, scenario, duration=duration, **given)
+    return scheduled(table, point, scenario, duration=duration, outside="fade", **given)
 
 
 def read_duration(text: str | None, rig: Rig | None, usual: float = 200.0) -> float:

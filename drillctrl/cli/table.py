@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 from click.core import ParameterSource
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from drillctrl.tables.gain_table import GainTable
     from drillctrl.tables.grid import Grid
 
-CONTROLLERS = (".c", ".st")
+CONTROLLERS = (".c", ".st", ".scl", ".xml", ".fmu")
 # What may go with a table that is there already.
-_CONTROLLER = ("period", "limit", "ramp", "real")
+_OPTIONS = ("ramp", "outside", "fade", "hold", "watchdog", "rate_limit", "release")
+_CONTROLLER = ("period", "limit", "real", "fmi", *_OPTIONS)
 _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot")
 
 
@@ -72,11 +73,26 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
     "--from", "source", type=click.Path(), metavar="FILE", help="A saved table instead of a design."
 )
 @click.option(
-    "--period", metavar="TIME", help="Of a .c or .st controller, such as 0.01; '10 ms' with a rig."
+    "--period",
+    metavar="TIME",
+    help="Of a controller (.c …), such as 0.01; '10 ms' with a rig.",
 )
 @click.option("--limit", metavar="TORQUE", help="Its largest |u|, such as 5; '5 kN*m' with a rig.")
 @click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
+@click.option(
+    "--outside", help="Where it vouches for nothing: fade (default) or hold the last good gains."
+)
+@click.option("--fade", type=int, metavar="SAMPLES", help="Of such a fade (default: a delay).")
+@click.option(
+    "--hold", type=int, metavar="SAMPLES", help="Missing in a row before it fades (default 3)."
+)
+@click.option("--watchdog", type=int, metavar="SAMPLES", help="Equal in a row before it fades.")
+@click.option("--rate-limit", metavar="RATE", help="Its fastest change: 5, or '50 kN*m/s'.")
+@click.option(
+    "--release", type=int, metavar="SAMPLES", help="Of its switch-off (default: at once)."
+)
 @click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
+@click.option("--fmi", help="Standard of an .fmu: 3.0 (default) or 2.0.")
 @click.option(
     "--require-stable", is_flag=True, help="Exit with 3 if a node is not stable or refused."
 )
@@ -84,7 +100,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--out",
     type=click.Path(),
-    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h) or .st.",
+    help="Write FILE.csv, .json, .parquet, .mat, .nc, .c (with .h), .st, .scl, .xml or .fmu.",
 )
 @click.option("--plot", type=click.Path(), help="Draw gains and α: FILE.png, .svg, .pdf.")
 @click.pass_context
@@ -219,9 +235,13 @@ def _in_units(controller: dict[str, Any], grid: Grid) -> dict[str, Any]:
     scales = {
         "period": (units.TIME, None if rig is None else rig.time_scale),
         "limit": (units.TORQUE, None if rig is None else rig.torsional_stiffness),
+        "rate_limit": (
+            units.TORQUE_RATE,
+            None if rig is None else rig.torsional_stiffness / rig.time_scale,
+        ),
     }
     read = {
-        name: read_quantity(f"--{name}", controller[name], *scale)
+        name: read_quantity(f"--{name.replace('_', '-')}", controller[name], *scale)
         for name, scale in scales.items()
         if controller[name] is not None
     }
@@ -240,7 +260,7 @@ def _check_out(
     if ending not in CONTROLLERS:
         for name, value in controller.items():
             if value is not None and not (tried and name in ("period", "limit")):
-                raise InputError(name, value, "left out unless --out ends in .c or .st")
+                raise InputError(name, value, "left out unless --out is a controller's source")
     if out is None:
         return
     if ending not in CONTROLLERS:
@@ -251,31 +271,45 @@ def _check_out(
         return
     from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
     from drillctrl.tables.export_st import check_st_name
-    from drillctrl.tables.sampled import checked_sampling
+    from drillctrl.tables.settings import Options, checked_settings
 
     for name in ("period", "limit"):
         if controller[name] is None:
             raise InputError(name, "(missing)", f"given for {out}")
+    given = {name: controller[name] for name in _OPTIONS if controller[name] is not None}
+    for name, goes_with in (("real", ".c"), ("fmi", ".fmu")):
+        if controller[name] is not None and ending != goes_with:
+            raise InputError(name, controller[name], f"left out unless --out ends in {goes_with}")
     with naming("--out", "name"):
-        (check_c_name if ending == ".c" else check_st_name)(Path(out).stem)
-        checked_sampling(
-            grid, structure, controller["period"], controller["limit"], controller["ramp"]
+        (check_st_name if ending in (".st", ".scl", ".xml") else check_c_name)(Path(out).stem)
+        checked_settings(
+            grid,
+            structure,
+            controller["period"],
+            controller["limit"],
+            cast(Options, given),
         )
         if ending == ".c":
             check_c_header(Path(out).with_suffix(".h"))
     if controller["real"] is not None:
-        if ending == ".st":
-            raise InputError("real", controller["real"], "left out unless --out ends in .c")
         check_real(controller["real"])
+    if ending == ".fmu":
+        from drillctrl.tables.export_fmu import check_fmu
+
+        check_fmu(Path(out).stem, controller["fmi"] or "3.0")
 
 
 def _write(result: GainTable, out: str, controller: dict[str, Any]) -> None:
     path = Path(out)
     given = {name: value for name, value in controller.items() if value is not None}
-    if path.suffix.lower() == ".st":
+    if path.suffix.lower() in (".st", ".scl", ".xml"):
         from drillctrl.tables.export_st import export_st
 
         export_st(result, path, **given)
+    elif path.suffix.lower() == ".fmu":
+        from drillctrl.tables.export_fmu import export_fmu
+
+        export_fmu(result, path, **given)
     elif path.suffix.lower() == ".c":
         from drillctrl.tables.export_c import export_c
 

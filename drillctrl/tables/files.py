@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
@@ -19,13 +18,15 @@ from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
 from drillctrl.tables.gain_table import GainTable
+from drillctrl.tables.grid import Axis
+from drillctrl.tables.matlab import read_mat, write_mat
 
 # Beyond this no table of at most a million nodes is meant.
 MAX_BYTES = 1_000_000_000
+_DIMENSIONLESS = "dimensionless"
 _WHOLE = ("stable", "certified", "refused")
-# Of a little-endian MATLAB 5 file: its version, and the types of its elements.
-_MAT_VERSION = b"\x00\x01IM"
-_MAT_MATRIX, _MAT_DOUBLES, _MAT_UTF8 = 14, 9, 16
+# Under this name pandas keeps what else than columns a file holds.
+_ATTRIBUTES = b"PANDAS_ATTRS"
 
 
 def save_table(table: GainTable, path: str | Path) -> None:
@@ -98,12 +99,28 @@ def check_table_path(path: str | Path) -> None:
 
 
 def _write_csv(document: Document, file: IO[bytes]) -> None:
-    header = [f"{name}: {json.dumps(value)}" for name, value in document.header.items()]
+    plain = [name for name, unit in document.header["units"].items() if unit == "1"]
+    words = {**document.header, _DIMENSIONLESS: plain}
+    header = [f"{name}: {json.dumps(value)}" for name, value in words.items()]
+    shown = _shown(document.header)
     lists = [
-        [str(bool(v)).lower() for v in values] if name in _WHOLE else map(repr, values.tolist())
+        [str(bool(v)).lower() for v in values]
+        if name in _WHOLE
+        else map(repr, (shown.get(name, (name, 1.0))[1] * values).tolist())
         for name, values in document.columns.items()
     ]
-    file.write(csv_text(document.columns, zip(*lists, strict=True), header).encode("ascii"))
+    names = [shown.get(name, (name, 1.0))[0] for name in document.columns]
+    file.write(csv_text(names, zip(*lists, strict=True), header).encode("ascii"))
+
+
+def _shown(header: dict[str, Any]) -> dict[str, tuple[str, float]]:
+    """Return for axes in SI under what name, and times what, they stand in a CSV file."""
+    found = {}
+    for name, values in header["axes"].items():
+        unit, factor = Axis(name, tuple(values)).field_unit
+        if unit and name in header["units"]:
+            found[name] = f"{name}_{unit.replace('/', '_per_')}", factor
+    return found
 
 
 def _read_csv(path: Path) -> Document:
@@ -116,9 +133,13 @@ def _read_csv(path: Path) -> Document:
             header[name.strip()] = json.loads(value)
         else:
             raise ValueError("no rows")
-        rows, announced = checked_layout(header)
-        names = line.rstrip("\r\n").split(",")
-        if names != announced:
+        header.pop(_DIMENSIONLESS, None)
+        rows, names = checked_layout(header)
+        shown = _shown(header)
+        typed = line.rstrip("\r\n").split(",")
+        # Files of earlier versions have all in SI.
+        in_field = typed == [shown.get(name, (name, 1.0))[0] for name in names]
+        if not in_field and typed != names:
             raise ValueError("columns that were not announced")
         values = np.zeros((len(names), rows))
         count = 0
@@ -129,7 +150,16 @@ def _read_csv(path: Path) -> Document:
             values[:, count - 1] = [float(words.get(field, field)) for field in row]
     if count != rows:
         raise ValueError(f"{count} rows instead of the {rows} announced")
-    return Document(header, dict(zip(names, values, strict=True)))
+    columns = dict(zip(names, values, strict=True))
+    if in_field:
+        mesh = np.meshgrid(*header["axes"].values(), indexing="ij")
+        for name, exact in zip(header["axes"], mesh, strict=True):
+            if name in shown:
+                if not np.allclose(columns[name], shown[name][1] * exact.ravel(), 1e-12, 0.0):
+                    raise ValueError(f"a {name} that does not follow from the axes")
+                # Units round the last bit.
+                columns[name] = exact.ravel()
+    return Document(header, columns)
 
 
 def _write_json(document: Document, file: IO[bytes]) -> None:
@@ -153,15 +183,23 @@ def _write_parquet(document: Document, file: IO[bytes]) -> None:
 
     columns = {k: v != 0.0 if k in _WHOLE else v for k, v in document.columns.items()}
     table = pyarrow.table(columns)
-    text = json.dumps(document.header).encode()
-    pyarrow.parquet.write_table(table.replace_schema_metadata({"drillctrl": text}), file)
+    text = json.dumps(document.header)
+    words = {"drillctrl": text, _ATTRIBUTES: json.dumps({"drillctrl": text})}
+    pyarrow.parquet.write_table(table.replace_schema_metadata(words), file)
 
 
 def _read_parquet(path: Path) -> Document:
     import pyarrow.parquet
 
     with pyarrow.parquet.ParquetFile(path) as file:
-        header = json.loads(file.schema_arrow.metadata[b"drillctrl"])
+        words = file.schema_arrow.metadata or {}
+        if b"drillctrl" not in words and _ATTRIBUTES not in words:
+            raise ValueError(
+                "its header is lost: write the frame with its attrs, as pandas 2.1 and later read "
+                "and write them"
+            )
+        kept = words.get(b"drillctrl") or json.loads(words[_ATTRIBUTES])["drillctrl"]
+        header = json.loads(kept)
         rows, names = checked_layout(header)
         if file.metadata.num_rows != rows:
             raise ValueError(f"{file.metadata.num_rows} rows, which were not announced")
@@ -170,71 +208,6 @@ def _read_parquet(path: Path) -> Document:
             raise ValueError("columns that were not announced")
         data = file.read()
     return Document(header, {n: np.array(data[n].to_numpy(), dtype=float) for n in names})
-
-
-def _write_mat(document: Document, file: IO[bytes]) -> None:
-    import scipy.io
-
-    buffer = io.BytesIO()
-    fields: dict[str, Any] = {name: v[:, None] for name, v in document.columns.items()}
-    scipy.io.savemat(buffer, {**fields, "header": json.dumps(document.header)})
-    content = bytearray(buffer.getvalue())
-    # The description that savemat writes holds the time of day.
-    content[:116] = b"MATLAB 5.0 MAT-file, drillctrl gain table".ljust(116)
-    file.write(bytes(content))
-
-
-def _read_mat(path: Path) -> Document:
-    """Read what `_write_mat` writes.
-
-    Not by scipy's `loadmat`: it takes a file's word for types and sizes, so that a wrong byte
-    ends the process, and a small compressed file fills the memory.
-    """
-    content = memoryview(path.read_bytes())
-    if bytes(content[124:128]) != _MAT_VERSION:
-        raise ValueError("not a MATLAB 5 file")
-    arrays: dict[str, tuple[int, memoryview]] = {}
-    place = 128
-    while place < len(content):
-        (kind, matrix), place = _mat_element(content, place)
-        if kind != _MAT_MATRIX:
-            raise ValueError("not written by drillctrl: compressed, or no matrix")
-        name, number, data = _mat_array(matrix)
-        if name in arrays:
-            raise ValueError(f"{name[:60]} twice")
-        arrays[name] = number, data
-    header = json.loads(bytes(arrays.pop("header")[1]))
-    _, names = checked_layout(header)
-    if list(arrays) != names or any(number != _MAT_DOUBLES for number, _ in arrays.values()):
-        raise ValueError("columns that were not announced")
-    return Document(header, {n: np.frombuffer(arrays[n][1], "<f8").astype(float) for n in names})
-
-
-def _mat_element(content: memoryview, place: int) -> tuple[tuple[int, memoryview], int]:
-    """Return type and bytes of the element at a place, and where the next one stands."""
-    kind, size = struct.unpack_from("<II", content, place)
-    start, width = place + 8, size
-    if kind >> 16:  # up to four bytes stand in the tag itself
-        kind, size, start, width = kind & 0xFFFF, kind >> 16, place + 4, 4
-    if size > width or start + size > len(content):
-        raise ValueError("an array beyond the end of the file")
-    return (kind, content[start : start + size]), start + width + -(start + width) % 8
-
-
-def _mat_array(matrix: memoryview) -> tuple[str, int, memoryview]:
-    """Return name, number type and bytes of a real column of doubles or a row of text."""
-    parts, place = [], 0
-    while place < len(matrix):
-        part, place = _mat_element(matrix, place)
-        parts.append(part)
-    (_, flags), (_, shape), (_, name), (number, data) = parts
-    rows, columns = struct.unpack("<ii", shape)
-    described = bytes(flags), number, (len(data), rows, columns)
-    column = struct.pack("<II", 6, 0), _MAT_DOUBLES, (8 * rows, rows, 1)
-    text = struct.pack("<II", 4, 0), _MAT_UTF8, (columns, 1, columns)
-    if described not in (column, text):
-        raise ValueError("an array that is neither a column of doubles nor a text")
-    return bytes(name).decode("ascii"), number, data
 
 
 def _write_netcdf(document: Document, file: IO[bytes]) -> None:
@@ -294,7 +267,7 @@ _FORMATS: dict[str, tuple[_Writer, _Reader]] = {
     ".csv": (_write_csv, _read_csv),
     ".json": (_write_json, _read_json),
     ".parquet": (_write_parquet, _read_parquet),
-    ".mat": (_write_mat, _read_mat),
+    ".mat": (write_mat, read_mat),
     ".nc": (_write_netcdf, _read_netcdf),
 }
 ENDINGS = tuple(_FORMATS)

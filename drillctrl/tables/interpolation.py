@@ -17,6 +17,8 @@ IntArray = npt.NDArray[np.intp]
 BoolArray = npt.NDArray[np.bool_]
 
 INTERPOLATED, CONSTANT, UNSAFE = 0, 1, 2
+# What a conversion of units has rounded, as a share of a coordinate, is not outside.
+SLACK = 1e-9
 CELL_NAMES = ("interpolated", "constant gains", "not stable")
 
 
@@ -64,8 +66,7 @@ def place(grid: Grid, coordinates: FloatArray) -> Place:
     inside = np.ones(len(coordinates), dtype=bool)
     for axis, value in zip(grid.axes, coordinates.T, strict=True):
         ticks = np.array(axis.values)
-        # What a conversion of units has rounded is not outside.
-        slack = 1e-9 * max(abs(ticks[0]), abs(ticks[-1]))
+        slack = SLACK * max(abs(ticks[0]), abs(ticks[-1]))
         inside &= (value >= ticks[0] - slack) & (value <= ticks[-1] + slack)
         if ticks.size == 1:
             low.append(np.zeros(len(value), dtype=np.intp))

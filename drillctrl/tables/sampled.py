@@ -5,20 +5,14 @@ from __future__ import annotations
 import hashlib
 import textwrap
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.tables.document import plain_values, to_document
 from drillctrl.tables.gain_table import GainTable
-from drillctrl.tables.grid import Grid
-from drillctrl.tables.interpolation import CONSTANT, UNSAFE
-
-# A ring of samples longer than this fits no drive.
-_DEEPEST = 1_000_000
+from drillctrl.tables.interpolation import CONSTANT, SLACK, UNSAFE
+from drillctrl.tables.settings import Options, Settings, checked_settings
 
 
 @dataclass(frozen=True)
@@ -27,8 +21,8 @@ class SampledController:
 
     Attributes
     ----------
-    period, limit : float
-        Sampling period and largest |u|, in the units of the table.
+    settings : Settings
+        What it does beside its law.
     axes : tuple of tuple of float
         Ticks of the three axes.
     node_gains : tuple of float
@@ -38,20 +32,32 @@ class SampledController:
         where the table does not vouch.
     cell_gains : tuple of float
         Entries of K1, then K2, of the cells with constant gains.
-    words : dict of str to str
+    words : dict of str to str or tuple of str
         What the templates of all languages name.
     reference : tuple of str
         Lines that say what the table was made for.
     """
 
-    period: float
-    limit: float
+    settings: Settings
     axes: tuple[tuple[float, ...], ...]
     node_gains: tuple[float, ...]
     cell_mode: tuple[int, ...]
     cell_gains: tuple[float, ...]
-    words: dict[str, str]
+    words: dict[str, str | tuple[str, ...]]
     reference: tuple[str, ...]
+
+    def ends(self, slack: float = SLACK) -> list[tuple[float, float]]:
+        """Return between what coordinates of each axis the table may vouch.
+
+        Parameters
+        ----------
+        slack : float
+            Share of a coordinate by which the arithmetic rounds it.
+        """
+        room = [slack * max(abs(ticks[0]), abs(ticks[-1])) for ticks in self.axes]
+        return [
+            (ticks[0] - part, ticks[-1] + part) for ticks, part in zip(self.axes, room, strict=True)
+        ]
 
     @property
     def stamp(self) -> str:
@@ -59,77 +65,17 @@ class SampledController:
         return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
 
 
-class Sampling(NamedTuple):
-    """Checked settings of a controller, and what follows from them.
-
-    Attributes
-    ----------
-    period, limit : float
-        As for `export_c`.
-    depth : int
-        Samples that the ring holds: the longest delay, what is in between two, and the newest.
-    ramp : int
-        Samples of the switch-on.
-    """
-
-    period: float
-    limit: float
-    depth: int
-    ramp: int
-
-
-def checked_sampling(
-    grid: Grid,
-    structure: FeedbackStructure,
-    period: float,
-    limit: float,
-    ramp: int | None,
-) -> Sampling:
-    """Check what a controller is to be, for which no gains need be known.
-
-    Parameters
-    ----------
-    grid, structure : Grid, FeedbackStructure
-        Of the table.
-    period, limit, ramp
-        As for `export_c`.
-
-    Raises
-    ------
-    InputError
-        As `export_c` does.
-    """
-    step = checked_number("period", period, 0.0, 1e6, open_low=True)
-    bound = checked_number("limit", limit, 0.0, 1e9, open_low=True)
-    # The words go into comments, which other names might end.
-    known = grid.plant.output_names
-    if not set(structure.outputs) <= set(known):
-        raise InputError("outputs", list(structure.outputs)[:4], f"of {', '.join(known)}")
-    if len(structure.inputs) != 1:
-        raise InputError("structure", structure.name, "one with a single input")
-    if grid.rig is not None and rig_gain_units(structure, grid.plant, grid.rig) is None:
-        raise InputError("structure", structure.name, "torque fed back from θ and θ'")
-    longest = max(point.delay for point in grid.points)
-    longest *= grid.rig.time_scale if grid.rig is not None else 1.0
-    # A period that is tiny makes a number of samples that is none.
-    if not longest / step < _DEEPEST:
-        least = longest / _DEEPEST
-        raise InputError("period", step, f"above {least:g}, for a delay of {longest:g}")
-    whole = int(longest / step)
-    # By default as long as the delayed outputs take to come in.
-    count = whole if ramp is None else checked_integer("ramp", ramp, 0, 10**9)
-    return Sampling(step, bound, whole + 3, count)
-
-
 def sampled_controller(
-    table: GainTable, name: str, period: float, limit: float, ramp: int | None
+    table: GainTable, name: str, period: float, limit: float, options: Options
 ) -> SampledController:
     """Collect what the source of a controller says.
 
     Parameters
     ----------
-    table, name, period, limit, ramp
+    table, name, period, limit
         As for `export_c`.
+    options : Options
+        Those that are not the default.
 
     Raises
     ------
@@ -137,7 +83,7 @@ def sampled_controller(
         As `export_c` does.
     """
     grid, structure, rig = table.grid, table.structure, table.grid.rig
-    step, bound, depth, count = checked_sampling(grid, structure, period, limit, ramp)
+    settings = checked_settings(grid, structure, period, limit, options)
     factors = rig_gain_units(structure, grid.plant, rig)
     scale = np.array([factor for factor, _ in factors]) if factors else np.ones(1)
     mode = table.cells.mode
@@ -160,20 +106,17 @@ def sampled_controller(
         else f"tau0 = 2 pi/({rig.blades:g} x rotary speed in rad/s), in s",
         "names": ", ".join(structure.outputs),
         "units": "dimensionless" if rig is None else "rad, rad/s, s, N m",
-        "sampling": f"every {step:g}{'' if rig is None else ' s'}, "
-        f"magnitude of u at most {bound:g}{'' if rig is None else ' N m'}, "
-        f"switched on over {count} samples",
+        "sampling": f"every {settings.period:g}{'' if rig is None else ' s'}, "
+        f"magnitude of u at most {settings.limit:g}{'' if rig is None else ' N m'}, "
+        f"switched on over {settings.ramp} samples",
+        "care": care_words(settings, "" if rig is None else " N m"),
         "axes": ", ".join(f"{axis.name} ({axis.unit})" for axis in table.grid.axes),
         "bounds": ", ".join(f"{entry} {low:g}..{high:g}" for entry, low, high in bounds),
         "trials": trial_words(table),
         "checksum": to_document(table).header["checksum"],
-        "outputs": str(len(structure.outputs)),
-        "depth": str(depth),
-        "ramp": str(count),
     }
     return SampledController(
-        step,
-        bound,
+        settings,
         tuple(axis.values for axis in table.grid.axes),
         tuple((table.entries * scale).ravel().tolist()),
         tuple(listed.tolist()),
@@ -190,3 +133,24 @@ def trial_words(table: GainTable) -> str:
     refused = len(table.refusals)
     text = f"gains of all {len(table.gains)} nodes tried on the nonlinear motion"
     return f"{text}; {refused} refused, control is off there" if refused else text
+
+
+def care_words(settings: Settings, unit: str) -> tuple[str, ...]:
+    """Say in lines what a controller does where it should not follow its law."""
+    fade = f"over {settings.fade} samples"
+    outside = {
+        "fade": f"Where the table does not vouch the last gains that it vouched for fade {fade}.",
+        "hold": "Where the table does not vouch the last gains that it vouched for stay.",
+    }
+    does = f"fade the command {fade}" if settings.watched else "are reported"
+    text = [
+        outside[settings.outside],
+        f"{settings.hold} samples that are none in a row are replaced by the last good one; "
+        f"then the command fades {fade}.",
+        f"{settings.frozen} equal samples in a row {does}.",
+    ]
+    if settings.rate is not None:
+        text.append(f"u changes by at most {settings.rate:g}{unit} a sample.")
+    if settings.release:
+        text.append(f"Switched off, u falls to 0 over {settings.release} samples.")
+    return tuple(textwrap.wrap(" ".join(text), 80))

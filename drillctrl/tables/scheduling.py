@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.tables.gain_table import GainTable
+from drillctrl.tables.interpolation import BoolArray
+from drillctrl.tables.settings import OUTSIDE
+
+CLAMP = "clamp"
 
 
 def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> FloatArray:
@@ -41,6 +46,8 @@ def scheduled(
     interval: float = 0.5,
     late: float = 0.0,
     duration: float = 1e4,
+    outside: str = "clamp",
+    fade: int | None = None,
     **options: float | str | None,
 ) -> Controller:
     """Return a controller whose gains and delay follow a table through a scenario.
@@ -62,6 +69,13 @@ def scheduled(
         By how much the controller learns of a change too late.
     duration : float
         Changes after this are left out.
+    outside : {"clamp", "fade", "hold"}
+        Where the table does not vouch, its gains there, clamped at its edges, are used all the
+        same ("clamp"), or, as in the exported controllers, the last gains that it vouched for
+        fade to zero or stay.
+    fade : int, optional
+        Samples of a fade (without ``period``: sixteenths of the longest delay); by default those
+        of the longest delay.
     **options
         Of `Controller`: activation, period, limit and the rest.
 
@@ -92,21 +106,61 @@ def scheduled(
         # Nothing in a scenario changes the plant.
         places[:, 2] = table.grid.plant.own[third]
     K1, K2 = table.gains_at(*places.T)
+    vouched = table.stable_at(*places.T)
     fixed = options.get("delay", "fixed") == "fixed"
-    entries = tuple(
+    longest = max(node.delay for node in table.grid.points)
+    tick = float(options.get("period") or longest / 16)
+    count = int(longest / tick) if fade is None else checked_integer("fade", fade, 0, 10**6)
+    if outside not in (CLAMP, *OUTSIDE):
+        raise InputError("outside", outside, f"one of {', '.join((CLAMP, *OUTSIDE))}")
+    if outside == CLAMP:
+        vouched = np.ones(len(places), dtype=bool)
+    if outside == "fade":
+        start = float(options.get("activation", 0.0) or 0.0)
+        shares = _trust(vouched, instants + lateness * (instants > 0.0), start, tick, max(count, 1))
+    else:
+        shares = [(float(t), i, 1.0) for i, t in enumerate(instants + lateness * (instants > 0.0))]
+    # The last place that the table vouched for; none before the first.
+    last = np.maximum.accumulate(np.where(vouched, np.arange(len(vouched)), -1))
+    entries = [
         ScheduleEntry(
-            float(t) + lateness,
-            K1[i],
-            K2[i],
+            time,
+            share * K1[max(last[i], 0)] * (last[i] >= 0),
+            share * K2[max(last[i], 0)] * (last[i] >= 0),
             replace(point, omega0=float(places[i, 0])).delay if fixed else None,
         )
-        for i, t in enumerate(times, 1)
-    )
+        for time, i, share in shares
+    ]
     return Controller(
         table.structure,
-        K1[0],
-        K2[0],
-        schedule=entries,
+        entries[0].K1,
+        entries[0].K2,
+        schedule=tuple(entries[1:]),
         plant=table.grid.plant,
         **options,  # type: ignore[arg-type]
     )
+
+
+def _trust(
+    vouched: BoolArray, times: FloatArray, start: float, tick: float, count: int
+) -> list[tuple[float, int, float]]:
+    """Return from when what share of the gains of which look-up is commanded.
+
+    The share goes up or down by 1/count a sample, and stands where it is to go before the
+    controller is switched on.
+    """
+    found: list[tuple[float, int, float]] = []
+    trust = count if vouched[0] else 0
+    for i, time in enumerate(times.tolist()):
+        goal = count if vouched[i] else 0
+        if time <= start:
+            trust = goal
+        sample = math.ceil((time - start) / tick - 1e-9)
+        end = math.inf if i + 1 == len(times) else (float(times[i + 1]) - start) / tick - 1e-9
+        if trust == goal:
+            found.append((time, i, trust / count))
+        while trust != goal and sample < end:
+            trust += 1 if goal else -1
+            found.append((start + sample * tick, i, trust / count))
+            sample += 1
+    return found

@@ -1,5 +1,7 @@
 """Small tables that several tests use."""
 
+import shutil
+
 import pytest
 
 from drillctrl import dimensionless_grid, linear_axis, rig_grid, table, table1
@@ -24,3 +26,14 @@ def on_rig():
         penetration_rate=linear_axis("penetration_rate", *rates, 2),
     )
     return table(grid, "case2", trials=False)
+
+
+@pytest.fixture
+def tool():
+    """Skip a test whose program is not on the path."""
+
+    def needed(name):
+        if shutil.which(name) is None:
+            pytest.skip(f"no {name} on the path")
+
+    return needed

@@ -1,5 +1,6 @@
 import csv
 import json
+import zipfile
 
 import pytest
 
@@ -77,6 +78,10 @@ NODES = ("--omega0", "9:11:2", "--delta0", "1:2:2", "--trials", "none")
         (("--out", "g.st", "--period", 1, "--limit", 3, "--real", "float"), "--real = float"),
         (("--out", "g.st", "--period", 1, "--limit", 3, "--ramp", -1), "--ramp = -1"),
         (("--out", "g.csv", "--period", 1), "--period = 1.0"),
+        (("--out", "g.c", "--period", 1, "--limit", 3, "--fmi", "3.0"), "--fmi = 3.0"),
+        (("--out", "g.fmu", "--period", 1, "--limit", 3, "--fmi", "1.0"), "--fmi = 1.0"),
+        (("--out", "g.c", "--period", 1, "--limit", 3, "--outside", "full"), "--outside = full"),
+        (("--out", "g.csv", "--rate-limit", 3), "--rate-limit = 3.0"),
         (("--out", "taken.csv"), "--out = taken.csv: must be a file, not a folder"),
         (("--out", "mine.c", "--period", 1, "--limit", 3), "mine.h moved"),
         (("--workers", 2, "--scheduler", "tcp://127.0.0.1:1"), "--workers = 2"),
@@ -131,3 +136,31 @@ def test_options_of_the_arithmetic_and_the_ramp_reach_the_controller(capsys, tmp
     assert run(capsys, "table", *NODES, "--out", out, *options)[0] == 0
     assert "typedef float g_real" in (tmp_path / "g.h").read_text()
     assert "#define RAMP 12\n" in out.read_text()
+
+
+@pytest.mark.parametrize("ending", [".xml", ".scl"])
+def test_dialects_are_chosen_by_the_ending(capsys, tmp_path, ending):
+    out = tmp_path / f"gains{ending}"
+    assert run(capsys, "table", *NODES, "--out", out, "--period", 0.01, "--limit", 5)[0] == 0
+    text = out.read_text()
+    assert ("tc6_0201" in text) == (ending == ".xml")
+    assert ('FUNCTION_BLOCK "gains"' in text) == (ending == ".scl")
+    assert {path.name for path in tmp_path.iterdir()} == {out.name, "gains.vectors.csv"}
+
+
+def test_a_unit_for_co_simulation_and_what_it_does_beside_its_law(capsys, tmp_path):
+    out = tmp_path / "g.fmu"
+    options = ("--period", 0.01, "--limit", 5, "--fmi", "2.0", "--outside", "hold")
+    more = ("--hold", 2, "--fade", 9, "--watchdog", 8, "--rate-limit", 30, "--release", 4)
+    assert run(capsys, "table", *NODES, "--out", out, *options, *more)[0] == 0
+    with zipfile.ZipFile(out) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    assert 'fmiVersion="2.0"' in text
+    for said in (
+        "vouched for stay",
+        "2 samples that are none",
+        "over 9 samples",
+        "8 equal samples",
+    ):
+        assert said in text
+    assert "u changes by at most 0.3 a sample. Switched off, u falls to 0 over 4" in text

@@ -2,10 +2,15 @@ import copy
 import csv
 import json
 import pickle
+import struct
+import tracemalloc
+import zlib
 
 import numpy as np
+import pandas
 import pyarrow.parquet
 import pytest
+import scipy.interpolate
 import scipy.io
 import xarray
 
@@ -227,12 +232,139 @@ def matlab_file(path, table, **options):
 def test_other_matlab_files_are_refused(small, tmp_path):
     path = tmp_path / "t.mat"
     assert_same(small, load_table(matlab_file(path, small)))
-    assert "compressed" in refuse(matlab_file(path, small, do_compression=True))
+    assert_same(small, load_table(matlab_file(path, small, do_compression=True)))
     gains = to_document(small).columns["K1_1"][:, None]
     for wrong in (gains + 1j, gains.T, gains.astype(np.float32), "text", {"a": gains}):
         refuse(matlab_file(path, small, fields={"K1_1": wrong}))
     refuse(matlab_file(path, small, fields={"more": gains}))
     refuse(matlab_file(path, small, format="4"))
+
+
+def test_matlab_interpolates_the_arrays_as_they_are(small, on_rig, tmp_path):
+    rng = np.random.default_rng(2)
+    for table in (small, on_rig):
+        path = tmp_path / "t.mat"
+        save_table(table, path)
+        mat = scipy.io.loadmat(path)
+        axes = [axis.ravel() for axis in mat["axes"].ravel()]
+        shape = [len(axis.values) for axis in table.grid.axes if len(axis.values) > 1]
+        assert [axis.size for axis in axes] == list(mat["K1_1"].shape) == shape
+        for axis in table.grid.axes:
+            assert mat[f"axis_{axis.name}"].ravel().tolist() == list(axis.values)
+        gains = scipy.interpolate.RegularGridInterpolator(axes, mat["K1_1"])
+        low, high = table.grid.coordinates.min(axis=0), table.grid.coordinates.max(axis=0)
+        places = low + (high - low) * rng.random((20, 3))
+        K1, _ = table.gains_at(*table.grid.groups(places).T)
+        # Where no cell has constant gains of its own.
+        plain = np.full(len(places), not (table.cells.mode == 1).any())
+        found = gains(places[:, [len(axis.values) > 1 for axis in table.grid.axes]])
+        assert plain.any()
+        assert found == pytest.approx(K1[:, 0, 0].tolist(), rel=1e-12)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_matlab_file_saved_anew_loads_again(small, on_rig, tmp_path, compressed):
+    for table in (small, on_rig):
+        path = tmp_path / "t.mat"
+        save_table(table, path)
+        read = {k: v for k, v in scipy.io.loadmat(path).items() if k[:2] != "__"}
+        # MATLAB sorts by name.
+        scipy.io.savemat(path, dict(sorted(read.items())), do_compression=compressed)
+        assert_same(table, load_table(path))
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def test_whole_numbers_in_few_bytes_and_texts_of_two_are_read(small, tmp_path):
+    """As MATLAB saves them."""
+    path = tmp_path / "t.mat"
+    save_table(small, path)
+    document = to_document(small)
+    parts = [path.read_bytes()[:128]]
+    for name, values in {**document.columns, "header": json.dumps(document.header)}.items():
+        if name == "header":
+            flags, kind, data = 4, 4, values.encode("utf-16-le")
+            shape = (1, len(values))
+        else:
+            whole = bool((values == values.astype(np.uint8)).all())
+            grid = values.reshape(3, 3).ravel(order="F")
+            flags, kind, data = 6, *((2, grid.astype("u1")) if whole else (9, grid))
+            data, shape = data.tobytes(), (3, 3)
+        matrix = b"".join(
+            (
+                element(6, struct.pack("<II", flags, 0)),
+                element(5, struct.pack("<ii", *shape)),
+                element(1, name.encode()),
+                element(kind, data),
+            )
+        )
+        packed = zlib.compress(element(14, matrix))
+        parts.append(struct.pack("<II", 15, len(packed)) + packed)
+    path.write_bytes(b"".join(parts))
+    assert_same(small, load_table(path))
+
+
+def test_a_matlab_7_3_file_is_refused_with_the_way_out(small, tmp_path):
+    path = tmp_path / "t.mat"
+    save_table(small, path)
+    whole = bytearray(path.read_bytes())
+    whole[124:128] = b"\x00\x02IM"
+    path.write_bytes(whole)
+    assert "'-v7'" in refuse(path)
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(whole))
+    assert "'-v7'" in refuse(path)
+
+
+def test_a_small_file_that_unpacks_to_a_lot_is_refused(small, tmp_path):
+    path = tmp_path / "t.mat"
+    save_table(small, path)
+    read = {k: v for k, v in scipy.io.loadmat(path).items() if k[:2] != "__"}
+    scipy.io.savemat(path, {**read, "K1_1": np.zeros((4000, 4000))}, do_compression=True)
+    assert path.stat().st_size < 200_000
+    tracemalloc.start()
+    assert "K1_1" in refuse(path) or "larger" in refuse(path)
+    assert tracemalloc.get_traced_memory()[1] < 20e6
+    tracemalloc.stop()
+
+
+def test_parquet_through_pandas_loads_again_or_says_what_to_write(small, on_rig, tmp_path):
+    path = tmp_path / "t.parquet"
+    for table in (small, on_rig):
+        save_table(table, path)
+        frame = pandas.read_parquet(path)
+        frame.to_parquet(path)
+        assert_same(table, load_table(path))
+    frame.attrs = {}
+    frame.to_parquet(path)
+    assert "with its attrs" in refuse(path)
+
+
+def test_csv_in_the_units_of_the_rig(on_rig, tmp_path):
+    path = tmp_path / "t.csv"
+    save_table(on_rig, path)
+    lines = path.read_text().splitlines()
+    header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert float(rows[0]["rotary_speed_rpm"]) == pytest.approx(100.0, rel=1e-12)
+    assert float(rows[-1]["penetration_rate_m_per_h"]) == pytest.approx(60.0, rel=1e-12)
+    strength = on_rig.grid.rig.rock_strength
+    assert float(rows[0]["rock_strength_MPa"]) == pytest.approx(strength / 1e6, rel=1e-12)
+    plain = json.loads(header["dimensionless"])
+    assert {"omega0", "delta0", "psi", "K1_1", "spectral_abscissa"} <= set(plain)
+    assert not {"delay_s", "K1_1_rig"} & set(plain)
+    # A change of what is shown in units of the rig is seen as well.
+    path.write_text(path.read_text().replace(rows[0]["rotary_speed_rpm"], "101.0"))
+    assert "does not follow" in refuse(path)
+    # Files of earlier versions have their axes in SI.
+    si = to_document(on_rig)
+    text = [f"# {k}: {json.dumps(v)}" for k, v in si.header.items()] + [",".join(si.columns)]
+    text += [
+        ",".join(map(repr, row)) for row in np.column_stack(list(si.columns.values())).tolist()
+    ]
+    path.write_text("\n".join(text) + "\n")
+    assert_same(on_rig, load_table(path))
 
 
 def test_a_matlab_file_with_any_byte_changed_is_refused_or_the_same(small, tmp_path):
