@@ -114,7 +114,7 @@ def test_a_bit_off_the_rock_for_turns_on_end_finds_the_face_again():
     run = kicked(at(table1(), 67.3, 42.8), 0.4, 0.4, controller, duration=60.0, rtol=1e-6)
     assert run.status == "done"
     random, passes = np.random.default_rng(1), []
-    for time in random.uniform(20.0, 60.0, 300):
+    for time in random.uniform(20.0, 60.0, 100):
         face = run.rock_face(time, 2)
         depth = run.at([time]).depth[0]
         assert depth == pytest.approx(run.point.blades * face.height[0], rel=1e-6, abs=1e-6)

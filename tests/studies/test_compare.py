@@ -35,7 +35,7 @@ PAPER = [
 def at_f():
     """Point F of the paper, without charts."""
     point = OperatingPoint(10.0, 12.0, 14.0)
-    return compare(point, given=PAPER, region=None, duration=120.0, trials=False)
+    return compare(point, given=PAPER, region=None, duration=80.0, trials=False)
 
 
 def row(comparison, label):
