@@ -146,6 +146,8 @@ BAD = [
     (["simulate", "--period", "0.1"], "--structure = (missing)"),
     (["simulate", "--table", "none.csv"], "table = none.csv"),
     (["simulate", "--table", "none.csv", "--K1", "3"], "--K1 = 3"),
+    (["simulate", "--structure", "p", "--K1", "1e308", "--duration", "1"], "K1 = 1e+308: must"),
+    (["analyze", "--out", "x" * 5000 + ".json"], "must be a file that can be written (File name"),
     (["simulate", "--structure", "p", "--K1", "1", "--limit", "-3"], "limit = -3.0"),
     (["simulate", "--structure", "p", "--K1", "1", "--limit", "3 kN*m"], "--limit = 3 kN*m"),
     (["simulate", "--structure", "p", "--K1", "1", "--noise", "theta=a"], "--noise = theta=a"),

@@ -42,7 +42,8 @@ def from_control(
         If the plant is no state-space system, is sampled, feeds its input through, or shapes do
         not fit.
     """
-    if not all(hasattr(plant, name) for name in ("A", "B", "C", "D")):
+    parts = ("A", "B", "C", "D", "dt", "state_labels", "input_labels", "output_labels")
+    if not all(hasattr(plant, name) for name in parts):
         raise InputError("plant", type(plant).__name__, "a state-space system: control.ss(plant)")
     if plant.dt:
         raise InputError("plant", f"sampled every {plant.dt}", "in continuous time")

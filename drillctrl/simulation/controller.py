@@ -17,6 +17,8 @@ from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.structures import preset_structure
 
 DELAYS = ("fixed", "current")
+# Beyond what any step of the integrator could follow.
+_LARGEST_GAIN = 1e15
 
 
 class ScheduleEntry(NamedTuple):
@@ -130,7 +132,9 @@ class Controller:
             raise InputError("noise", dict(self.noise), "left out unless there is a period")
         for name, deviation in self.noise.items():
             checked_number(f"noise {name}", deviation, 0.0, 1e9)
-        self.gain_sets()
+        for name, gains in zip(("K1", "K2"), self.gain_sets()[1:], strict=True):
+            for gain in gains.ravel().tolist():
+                checked_number(name, gain, -_LARGEST_GAIN, _LARGEST_GAIN)
         self.delays(0.0)
 
     def gain_sets(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -177,6 +177,9 @@ def simulate(
         checked_number("time_limit", time_limit, 0.0, open_low=True)
     case = as_case(where)
     plant, point = case.physics("a simulation")
+    if controller is not None and not isinstance(controller, Controller):
+        kind = type(controller).__name__
+        raise InputError("controller", kind, "a Controller, such as Controller(structure, K1, K2)")
     meant = None if controller is None else controller.plant
     if meant is not None and meant != plant and not other_plant:
         wanted = f"the one that the gains were designed for, {meant.text}, or other_plant=True"

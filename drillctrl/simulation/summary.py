@@ -98,7 +98,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         driven = simulation.on_steps(PER_STEP, names=inputs) if inputs else run
         # The run is in order of time; its tail starts with the step that holds `since`.
         tail = simulation.on_steps(PER_STEP, since, ("x", "theta", "dtheta", "delay", "contact"))
-    settled = all(
+    settled = simulation.steps > 0 and all(
         float(abs(getattr(tail, name)).max())
         <= max(SETTLED * float(abs(getattr(run, name)).max()), resolved)
         for name in ("x", "theta")

@@ -198,6 +198,8 @@ class Trace:
         At a jump both sides are there: the end of one step and the start of the next.
         ``names`` are as in `at`.
         """
+        if not self.steps:
+            return self.at(self.times, names)
         start, length = self._column("START"), self._column("LENGTH")
         first = max(1, int(np.searchsorted(start, since, side="right")) - 1)
         s = np.linspace(0.0, 1.0, per_step)

@@ -171,3 +171,11 @@ def test_responses_plot_in_python_control():
 def test_a_delay_system_keeps_its_names():
     system = DelaySystem([[-1.0]], ([[-0.5]],), (0.3,), [[1.0]], [[1.0]])
     assert lifted_system(system, 3).nstates == 1 + 3 + 1
+
+
+def test_systems_of_other_packages_are_told_what_to_become():
+    import scipy.signal
+
+    for plant in (scipy.signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), 3.0):
+        with pytest.raises(InputError, match=r"control\.ss\(plant\)"):
+            from_control(plant, 1.0)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint
+from drillctrl.drilling.structures import soft_torque
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
@@ -158,3 +162,16 @@ def test_changes_lead_to_the_steady_state_of_the_new_point(duration):
     np.testing.assert_allclose(end.depth, depth, rtol=1e-2)
     # The wear flat stays the starting point's.
     np.testing.assert_allclose(end.weight_on_bit, goal.psi * depth + start.lam, rtol=1e-2)
+
+
+def test_what_is_no_controller_is_refused(point_c):
+    for other in (soft_torque(), "case1", 3.0):
+        with pytest.raises(InputError, match="controller = "):
+            simulate(point_c, other)
+
+
+def test_a_run_that_took_no_step_is_not_settled(point_c):
+    run = simulate(point_c, duration=1.0, max_steps=1)
+    none = replace(run, history=type(run.history)(*(part[:1] for part in run.history)))
+    assert none.steps == 0
+    assert not none.summary.settled
