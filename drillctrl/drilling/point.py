@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number, takes
 from drillctrl.drilling.rig import Rig
 
 # Wear-flat groups of Table 1, used where a dimensionless point leaves them open.
@@ -196,3 +196,7 @@ def _quotient(
     if numerator > 0.0:
         raise InputError(name, group, "0, since the reference rig has no such friction")
     return otherwise
+
+
+# What works in the units of a rig.
+takes_rig_point = takes(RigPoint, "a RigPoint: a rig, its speed and rate of penetration")
