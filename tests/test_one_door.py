@@ -1,10 +1,12 @@
 """Every verb takes a point, a rig at its point, a system or a case; or says in one line why not."""
 
+import inspect
 import math
 
 import numpy as np
 import pytest
 
+import drillctrl
 from drillctrl import (
     InputError,
     OperatingPoint,
@@ -73,3 +75,35 @@ def test_every_verb_takes_it_or_says_why_not(verb, kind):
         assert not str(caught.value).endswith("one of")
     else:
         assert ask(PLACES[kind]) is not None
+
+
+def _first_argument(name):
+    value = getattr(drillctrl, name)
+    first = next(iter(inspect.signature(value).parameters.values()), None)
+    return None if first is None else str(first.annotation)
+
+
+FUNCTIONS = [name for name in dir(drillctrl) if inspect.isfunction(getattr(drillctrl, name))]
+ONE_KIND = {
+    "DelaySystem": [name for name in FUNCTIONS if _first_argument(name) == "DelaySystem"],
+    "RigPoint": [name for name in FUNCTIONS if _first_argument(name) == "RigPoint"],
+    "Grid": [name for name in FUNCTIONS if _first_argument(name) == "Grid"],
+}
+
+
+@pytest.mark.parametrize("kind", ONE_KIND)
+def test_what_works_on_one_kind_alone_says_so(kind):
+    """Whatever else it takes: the first argument is looked at before anything."""
+    assert ONE_KIND[kind]
+    for name in ONE_KIND[kind]:
+        function = getattr(drillctrl, name)
+        for where in (POINT, PLACES["case"], None, 3.0):
+            least = [
+                parameter
+                for parameter in inspect.signature(function).parameters.values()
+                if parameter.default is parameter.empty
+                and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+            ]
+            with pytest.raises(InputError, match=f"must be a {kind}") as caught:
+                function(where, *[None] * (len(least) - 1))
+            assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Kinds of arrays."""
+"""Names for kinds of NumPy arrays."""
 
 from __future__ import annotations
 

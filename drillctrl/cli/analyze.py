@@ -1,4 +1,4 @@
-"""`drillctrl analyze`."""
+"""`drillctrl analyze`: roots, count and trial runs of given gains, or of none."""
 
 from __future__ import annotations
 

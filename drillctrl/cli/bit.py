@@ -1,4 +1,4 @@
-"""`drillctrl bit`."""
+"""`drillctrl bit`: how a bit answers its speed, and the damping left to its string."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drillctrl chart`."""
+"""`drillctrl chart`: where a loop is stable, or some gains make it so, over two parameters."""
 
 from __future__ import annotations
 

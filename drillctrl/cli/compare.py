@@ -1,4 +1,4 @@
-"""`drillctrl compare`."""
+"""`drillctrl compare`: designs of several structures, or drives of a string, side by side."""
 
 from __future__ import annotations
 

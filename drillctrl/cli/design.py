@@ -1,4 +1,4 @@
-"""`drillctrl design`."""
+"""`drillctrl design`: gains, and what is known of them."""
 
 from __future__ import annotations
 

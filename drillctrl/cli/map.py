@@ -1,4 +1,4 @@
-"""`drillctrl map`."""
+"""`drillctrl map`: how hard the bit vibrates over two of the things that a driller sets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the work has come."""
+"""How far the work has come, on standard error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drillctrl reproduce`."""
+"""`drillctrl reproduce`: the paper's figures and numbers, beside ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drillctrl rig`."""
+"""`drillctrl rig`: what is understood of a rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drillctrl simulate`."""
+"""`drillctrl simulate`: the motion from a start, printed, written and drawn."""
 
 from __future__ import annotations
 

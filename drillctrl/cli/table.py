@@ -1,4 +1,4 @@
-"""`drillctrl table`."""
+"""`drillctrl table`: gains over a grid of points, to files and as source for a controller."""
 
 from __future__ import annotations
 

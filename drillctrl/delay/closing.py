@@ -11,7 +11,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 
 
 def gain_matrices(
@@ -47,6 +47,7 @@ def gain_matrices(
     return matrices[0], matrices[1]
 
 
+@takes_system
 def close_loop(
     system: DelaySystem,
     feedback: FeedbackStructure,

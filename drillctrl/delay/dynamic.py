@@ -15,13 +15,14 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.delay.closing import with_channels
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 
 Controlled = tuple[DelaySystem, FeedbackStructure]
 
 _MOST_STATES = 20
 
 
+@takes_system
 def pid_control(
     system: DelaySystem,
     input_name: str,
@@ -102,6 +103,7 @@ def pid_control(
     return grown, FeedbackStructure("pid", names, -most, most, zero, zero, (input_name,))
 
 
+@takes_system
 def dynamic_control(
     system: DelaySystem,
     inputs: Sequence[str],
@@ -165,6 +167,7 @@ def dynamic_control(
     return grown, structure
 
 
+@takes_system
 def observer_control(
     system: DelaySystem,
     inputs: Sequence[str],

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number, takes
 from drillctrl.drilling.rig import Rig
 
 # Wear-flat groups of Table 1, used where a dimensionless point leaves them open.
@@ -212,3 +212,7 @@ def changed_by(
             penetration_rate=where.penetration_rate * rate,
         )
     return where.with_changes(omega0=where.omega0 * speed, delta0=where.delta0 * rate / speed)
+
+
+# What works in the units of a rig.
+takes_rig_point = takes(RigPoint, "a RigPoint: a rig, its speed and rate of penetration")

@@ -15,7 +15,7 @@ from drillctrl.drilling.coefficients import (
     Coefficients,
     rig_coefficients,
 )
-from drillctrl.drilling.point import RigPoint
+from drillctrl.drilling.point import RigPoint, takes_rig_point
 from drillctrl.drilling.rig import Rig
 
 
@@ -59,6 +59,7 @@ def _coefficients(point: RigPoint) -> Coefficients:
     return rig_coefficients(SimpleNamespace(**rig_parameter_values(point)))
 
 
+@takes_rig_point
 def steady_state(point: RigPoint) -> SteadyState:
     """Return loads, deformations and depth of cut of steady drilling (Eqs. 10-12)."""
     c = _coefficients(point)

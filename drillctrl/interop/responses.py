@@ -10,7 +10,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.extras import required
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
 
 # What is smaller is left out at high frequencies: gain margins are looked for up to its inverse.
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import control
 
 
+@takes_system
 def to_frd(
     system: DelaySystem, omega: npt.ArrayLike | None = None
 ) -> control.FrequencyResponseData:
@@ -47,6 +48,7 @@ def to_frd(
     )
 
 
+@takes_system
 def loop_frd(
     system: DelaySystem,
     structure: FeedbackStructure,

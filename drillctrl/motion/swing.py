@@ -252,6 +252,8 @@ def mode_at(
     **options
         Of `bit_response`.
     """
+    if not isinstance(mode, TorsionalMode):
+        raise InputError("mode", repr(mode), "a TorsionalMode, one of those of torsional_modes")
     found = _followed(where, mode, amplitude, {**options, "ripple": ripple})
     if ripple and found.broken is not None:
         found = _followed(where, mode, amplitude, options)

@@ -12,7 +12,7 @@ import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 from drillctrl.robustness.axis import crossings
 from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -62,6 +62,7 @@ class ParameterMargin:
     resolution: float
 
 
+@takes_system
 def delay_margin(system: DelaySystem) -> DelayMargin:
     """Return by how much the delays may be wrong before a root reaches the axis.
 

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 from drillctrl.robustness.axis import size_bound
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
@@ -48,6 +48,7 @@ class PeakGain:
     frequency: float
 
 
+@takes_system
 def h_infinity_norm(system: DelaySystem) -> PeakGain:
     """Return the H∞ norm of G(s) = C Δ(s)⁻¹ B.
 

@@ -8,7 +8,7 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
-from drillctrl.drilling.point import RigPoint
+from drillctrl.drilling.point import RigPoint, takes_rig_point
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
@@ -26,6 +26,7 @@ LAW_LOOP = FeedbackStructure(
 )  # fmt: skip
 
 
+@takes_rig_point
 def drive_controller(
     where: RigPoint, control: DriveControl, *, period: float | None = None
 ) -> Controller:
@@ -81,6 +82,7 @@ def drive_controller(
     )
 
 
+@takes_rig_point
 def law_controller(
     where: RigPoint,
     control: DriveControl,

@@ -1,4 +1,4 @@
-"""Lay out a run for the compiled integrator."""
+"""Lay out a run for the compiled integrator: its settings, its past and its first state."""
 
 from __future__ import annotations
 

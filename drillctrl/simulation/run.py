@@ -1,4 +1,4 @@
-"""The call that simulates."""
+"""`simulate`: run a scenario on the nonlinear or the linear plant, and return the motion."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import numpy as np
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.friction import Stribeck
-from drillctrl.drilling.point import RigPoint
+from drillctrl.drilling.point import RigPoint, takes_rig_point
 from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
@@ -72,6 +72,7 @@ class Slowing:
         }
 
 
+@takes_rig_point
 def slow_down(
     where: RigPoint,
     control: DriveControl,

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.reduced import ReducedLoops, reduced
-from drillctrl.delay.system import DelaySystem
+from drillctrl.delay.system import DelaySystem, takes_system
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
 
@@ -72,6 +72,7 @@ class Followed:
     slope: ComplexArray
 
 
+@takes_system
 def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.drilling.case import Case
+from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.linear import bit_response
 from drillctrl.strings.at_bit import StringAtBit, string_at_bit
 from drillctrl.strings.drill_string import DrillString
@@ -139,12 +139,12 @@ class ExactLoop:
         raise InputError("near", near, "close to a root")
 
 
-def exact_loop(case: Case, top: TopStiffness | None = None) -> ExactLoop:
+def exact_loop(where: Where, top: TopStiffness | None = None) -> ExactLoop:
     """Return the exact loop of a case whose string is one of pipe.
 
     Parameters
     ----------
-    case : Case
+    where : RigPoint or Case
         What drills, and where.
     top : callable, optional
         s in 1/s → dynamic stiffness of the drive in N m/rad; by default that of the plant's
@@ -155,6 +155,7 @@ def exact_loop(case: Case, top: TopStiffness | None = None) -> ExactLoop:
     InputError
         If the string is another one, or nothing holds the speed of the drive.
     """
+    case = as_case(where)
     plant, _ = case.physics("an exact loop")
     if not isinstance(plant.string, PipeString):
         raise InputError("string", type(plant.string).__name__, "a PipeString")

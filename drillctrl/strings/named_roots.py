@@ -11,7 +11,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.case import Case
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.strings.check import AXIAL_BAND, TORSIONAL_BAND, Mode, string_modes
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_law import DriveLaw
@@ -162,7 +162,7 @@ def turned_by(case: Case) -> DriveControl | None:
 
 
 def named_roots(
-    case: Case,
+    where: Where,
     structure: FeedbackStructure | None = None,
     K1: FloatArray | None = None,
     K2: FloatArray | None = None,
@@ -174,7 +174,7 @@ def named_roots(
 
     Parameters
     ----------
-    case : Case
+    where : OperatingPoint, RigPoint, DelaySystem or Case
         What drills, and where.
     structure : FeedbackStructure, optional
         Feedback of the bit's own motion.
@@ -187,6 +187,7 @@ def named_roots(
         None where the string is none of pipe, nothing is known of what turns it, or the
         feedback is of something else.
     """
+    case = as_case(where)
     if case.plant is None or not isinstance(case.plant.string, PipeString):
         return None
     control = turned_by(case)

@@ -1,4 +1,4 @@
-"""Strings by name."""
+"""Drill strings and rigs by name."""
 
 from __future__ import annotations
 

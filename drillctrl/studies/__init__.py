@@ -1,1 +1,1 @@
-"""Campaigns: the nonlinear motion after disturbances of many sizes, over many operating points."""
+"""Many runs or designs side by side: comparisons, campaigns of disturbances, vibration maps."""

@@ -1,4 +1,4 @@
-"""A table as a controller in C99: one header, one source, no allocation, no library."""
+"""A table as a controller in C99, from its template: one header, one source, no allocation."""
 
 from __future__ import annotations
 
