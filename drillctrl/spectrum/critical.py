@@ -124,31 +124,33 @@ def _sharpened(
     A0: FloatArray, late: FloatArray, rows: IntArray, omega: FloatArray, phase: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
     """Newton's method on det Δ(iω, φ) = 0; keep what converges nearby, once each."""
-    start = omega.copy()
+    start, omega, phase = omega, omega.copy(), phase.copy()
     eye = np.eye(A0.shape[1])
     good = np.ones(rows.shape, dtype=bool)
-    step = turn = np.zeros(rows.shape)
-    by_omega = by_phase = np.ones(rows.shape, dtype=complex)
+    step, turn = np.zeros(rows.shape), np.zeros(rows.shape)
+    by_omega, by_phase = np.ones((2, *rows.shape), dtype=complex)
+    # Those that still move.
+    on = np.arange(rows.size)
     for _ in range(12):
-        term = np.exp(-1j * phase)[:, None, None] * late[rows]
-        delta = 1j * omega[:, None, None] * eye - A0[rows] - term
-        inverse = inverses(delta)
+        term = np.exp(-1j * phase[on])[:, None, None] * late[rows[on]]
+        inverse = inverses(1j * omega[on, None, None] * eye - A0[rows[on]] - term)
         # Derivatives of ln det Δ: a step solves by_omega δω + by_phase δφ = −1.
         new_omega = 1j * np.trace(inverse, axis1=1, axis2=2)
         new_phase = 1j * np.einsum("qij,qji->q", inverse, term)
         fine = np.isfinite(new_omega) & np.isfinite(new_phase)
-        by_omega = np.where(fine, new_omega, by_omega)
-        by_phase = np.where(fine, new_phase, by_phase)
+        by_omega[on[fine]], by_phase[on[fine]] = new_omega[fine], new_phase[fine]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            across = (by_omega * by_phase.conj()).imag
-            step, turn = by_phase.imag / across, -by_omega.imag / across
+            across = (by_omega[on] * by_phase[on].conj()).imag
+            along, around = by_phase[on].imag / across, -by_omega[on].imag / across
         # Where Δ is singular to the last bit nothing is left to do.
-        good = np.isfinite(step) & np.isfinite(turn) | ~fine
-        step, turn = np.where(good & fine, step, 0.0), np.where(good & fine, turn, 0.0)
-        scale = 0.05 * (1e-3 + np.abs(omega))
-        omega = omega + np.clip(step, -scale, scale)
-        phase = phase + np.clip(turn, -0.2, 0.2)
-        if (np.abs(step) <= 1e-11 * omega).all() and (np.abs(turn) <= 1e-11).all():
+        good[on] = np.isfinite(along) & np.isfinite(around) | ~fine
+        step[on] = np.where(good[on] & fine, along, 0.0)
+        turn[on] = np.where(good[on] & fine, around, 0.0)
+        scale = 0.05 * (1e-3 + np.abs(omega[on]))
+        omega[on] += np.clip(step[on], -scale, scale)
+        phase[on] += np.clip(turn[on], -0.2, 0.2)
+        on = on[(np.abs(step[on]) > 1e-11 * omega[on]) | (np.abs(turn[on]) > 1e-11)]
+        if not on.size:
             break
     keep = good & (np.abs(step) < 1e-8 * omega) & (np.abs(turn) < 1e-8) & (omega > 1e-9)
     keep &= np.abs(omega - start) < 0.05 * (1e-3 + start)
