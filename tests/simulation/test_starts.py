@@ -96,7 +96,7 @@ def test_the_command_says_so(capsys, tmp_path):
     rows = (tmp_path / "worst.csv").read_text().splitlines()
     times = [float(row.split(",")[0]) for row in rows[2:]]
     steps = np.diff(times)
-    np.testing.assert_allclose(steps, 0.5 * table1().time_scale, rtol=1e-9)
+    np.testing.assert_allclose(steps, 0.2, rtol=1e-9)
     with pytest.raises(SystemExit) as stop:
         main([*arguments, "--require-stable"])
     assert stop.value.code == 3
