@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import click
@@ -19,6 +20,20 @@ from drillctrl.cli.verb import Verb
     "--amplitudes",
     metavar="A,…",
     help="Swings of the bit's speed, shares of it, rising in (0, 1); 0.01 to 0.95 without it.",
+)
+@click.option(
+    "--frequency",
+    "frequencies",
+    multiple=True,
+    metavar="HZ",
+    help="H there, '0.45 Hz' (without a rig ω); may be repeated.",
+)
+@click.option(
+    "--amplitude",
+    "amplitude",
+    multiple=True,
+    type=float,
+    help="Swings for --frequency, shares of the speed (default 0.03); may be repeated.",
 )
 @click.option(
     "--modes",
@@ -51,6 +66,8 @@ from drillctrl.cli.verb import Verb
 @click.option("--plot", type=click.Path(), help="Draw the damping left: FILE.png, .svg, .pdf.")
 def bit_command(
     amplitudes: str | None,
+    frequencies: tuple[str, ...],
+    amplitude: tuple[float, ...],
     modes: int,
     most_periods: int,
     imposed: bool,
@@ -74,11 +91,20 @@ def bit_command(
       drillctrl bit --rig table1 --speed "120 rpm" --rop "50 m/h" --plot bit.png
       drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --band --plot band.png
       drillctrl bit --rig table1 --speed "150 rpm" --rop "50 m/h" --along speed
+      drillctrl bit --rig table1 --speed "120 rpm" --rop "20 m/h" --frequency "0.45 Hz" --json
     """
     check_json(out)
     check_figure(plot)
     wanted = _read(amplitudes)
     where = read_point(point)
+    if amplitude and amplitudes is not None:
+        raise InputError("--amplitude", amplitude[0], "left out with --amplitudes")
+    if amplitude:
+        wanted = sorted(set(amplitude))
+    elif frequencies and wanted is None:
+        wanted = [0.03]
+    if frequencies and (band or along is not None):
+        raise InputError("--frequency", frequencies[0], "left out with --band and --along")
     if band and along is not None:
         raise InputError("--along", along, "left out with --band")
     if along is not None:
@@ -87,9 +113,10 @@ def bit_command(
     if band:
         _band(where, wanted, workers, most_periods, imposed, as_json, out, plot)
         return
-    from drillctrl.motion.report import motion_fields, motion_summary
+    from drillctrl.motion.report import motion_fields, motion_summary, responses_summary
     from drillctrl.motion.swing import AMPLITUDES, drilling_motion
 
+    asked = [_read_frequency(text, where) for text in frequencies]
     found = drilling_motion(
         where,
         AMPLITUDES if wanted is None else wanted,
@@ -98,9 +125,19 @@ def bit_command(
         most_periods=most_periods,
         ripple=not imposed,
     )
-    text = functools.partial(motion_summary, found)
+    text, responses = functools.partial(motion_summary, found), None
+    if asked:
+        from drillctrl.motion.response import bit_response
+
+        responses = [
+            bit_response(where, omega, a, most_periods=most_periods)
+            for omega in asked
+            for a in wanted or ()
+        ]
+        text = functools.partial(responses_summary, found, responses)
     draw = functools.partial(found.plot, name=rig_name(point))
-    deliver(motion_fields(found), text, draw, as_json=as_json, out=out, plot=plot)
+    fields = motion_fields(found, responses)
+    deliver(fields, text, draw, as_json=as_json, out=out, plot=plot)
 
 
 def _band(
@@ -147,6 +184,26 @@ def _along(
     text = functools.partial(along_summary, found)
     draw = functools.partial(found.plot, name=name)
     deliver(fields, text, draw, as_json=as_json, out=out, plot=plot)
+
+
+def _read_frequency(text: str, where: Any) -> float:
+    """Return a dimensionless angular frequency from Hz of a rig, or from a number."""
+    from drillctrl.drilling.case import as_case
+
+    rig = as_case(where).rig
+    number, _, unit = text.strip().partition(" ")
+    per_unit = {"Hz": 2.0 * math.pi, "mHz": 2e-3 * math.pi, "rad/s": 1.0}.get(unit.strip())
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if rig is None:
+        if unit or not math.isfinite(value):
+            raise InputError("--frequency", text, "a number ω, or a rig to go with its unit")
+        return value
+    if per_unit is None or not math.isfinite(value):
+        raise InputError("--frequency", text, "a number with its unit: '0.45 Hz' or '2.83 rad/s'")
+    return value * per_unit * rig.time_scale
 
 
 def _read(amplitudes: str | None) -> list[float] | None:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import click
+
 from drillctrl.base.errors import InputError
 
 if TYPE_CHECKING:
     from drillctrl.base.units import Dimension
 
 
-def read_quantity(option: str, text: str, dimension: Dimension, unit: float | None) -> float:
+def read_quantity(
+    option: str, text: str, dimension: Dimension, unit: float | None, *, noted: bool = False
+) -> float:
     """Return a number: SI where a rig's unit is known, else dimensionless.
 
     Parameters
@@ -21,6 +25,8 @@ def read_quantity(option: str, text: str, dimension: Dimension, unit: float | No
         What it has to be.
     unit : float or None
         SI value of one dimensionless unit; None without a rig.
+    noted : bool
+        Whether a bare number with a rig is dimensionless, with a note of what it is in SI.
 
     Raises
     ------
@@ -39,5 +45,9 @@ def read_quantity(option: str, text: str, dimension: Dimension, unit: float | No
         return units.to_si(option, text, dimension)
     if unit is None or unit == 1.0 or bare == 0.0:
         return bare
+    if noted:
+        told = f"{option} = {text} is dimensionless, {bare * unit:.6g} {dimension.unit}"
+        click.echo(f"drillctrl: note: {told}", err=True)
+        return bare * unit
     both = f"'{text} {dimension.unit}', or '{bare * unit:.6g} {dimension.unit}'"
     raise InputError(option, text, f"given with its unit: {both} for the dimensionless {text}")

@@ -83,7 +83,7 @@ def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
 
 
 def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[str, float]:
-    """Return dimensionless numbers of states by name; with a rig each carries its unit.
+    """Return dimensionless numbers of states by name; with a rig each may carry its unit.
 
     Names are those of the bit, ``x``, ``theta`` and their rates, or of a further coordinate
     that begins so, which is of the same kind.
@@ -107,7 +107,8 @@ def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[s
         for start, quantity, dimension in kinds:
             if name.startswith(start):
                 unit = si_scale(quantity, rig)
-                numbers[name] = read_quantity(f"{option} {name}", value, dimension, unit) / unit
+                typed = read_quantity(f"{option} {name}", value, dimension, unit, noted=True)
+                numbers[name] = typed / unit
                 break
         else:
             raise InputError(option, text, "of states x, dx, theta, dtheta")
@@ -115,11 +116,11 @@ def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[s
 
 
 def read_time(option: str, text: str, rig: Rig | None) -> float:
-    """Return dimensionless time from a number, or of a rig from a time with its unit."""
+    """Return dimensionless time from a number, which is noted, or of a rig from a time."""
     from drillctrl.base import units
 
     unit = None if rig is None else rig.time_scale
-    return read_quantity(option, text, units.TIME, unit) / (unit or 1.0)
+    return read_quantity(option, text, units.TIME, unit, noted=True) / (unit or 1.0)
 
 
 def read_disturbance(text: str | None, rig: Rig | None) -> dict[str, float]:

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import math
 import statistics
+import textwrap
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.quantities import si_scale
 from drillctrl.motion.band import BitBand
 from drillctrl.motion.orbit import AxialOrbit
+from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
 from drillctrl.motion.threshold import ModeAlong
 from drillctrl.spectrum.roots import spectral_abscissa
 
 
 class Units(NamedTuple):
-    """SI values of dimensionless units; 1 where there is no rig."""
+    """SI values of dimensionless units; 1 where there is no rig.
+
+    ``turn`` is what an angular frequency is divided by to be told: in Hz of a rig.
+    """
 
     response: float
     time: float
     weight: float
     torque: float
+    turn: float
     response_name: str
     rate_name: str
 
@@ -29,18 +36,40 @@ class Units(NamedTuple):
 def units_of(case: Case) -> Units:
     """Return the units in which a case is told."""
     if case.rig is None:
-        return Units(1.0, 1.0, 1.0, 1.0, "", "")
+        return Units(1.0, 1.0, 1.0, 1.0, 1.0, "", "")
     weight, torque, time = (si_scale(name, case.rig) for name in ("force", "torque", "time"))
-    return Units(torque * time, time, weight, torque, "N·m·s/rad", "1/s")
+    turn = 2.0 * math.pi * time
+    return Units(torque * time, time, weight, torque, turn, "N·m·s/rad", "1/s")
 
 
-def motion_fields(found: DrillingMotion) -> dict[str, Any]:
-    """Return the JSON fields; in SI where there is a rig, else dimensionless."""
+def motion_fields(
+    found: DrillingMotion, responses: Sequence[BitResponse] | None = None
+) -> dict[str, Any]:
+    """Return the JSON fields; in SI and Hz where there is a rig, else dimensionless.
+
+    Parameters
+    ----------
+    found : DrillingMotion
+        Of the case.
+    responses : sequence of BitResponse, optional
+        Those told as ``response``; by default those of the modes.
+    """
     units = units_of(found.case)
     orbit = found.orbit
+    if responses is None:
+        responses = [each.response for swing in found.modes for each in swing.at]
+    torque, weight = orbit.torque * units.torque, orbit.weight * units.weight
     return {
         "schema": "drillctrl/bit/1",
         "units": "SI" if found.case.rig is not None else "dimensionless",
+        "response": [_response_fields(each, units) for each in responses],
+        "mean_torque": _number(torque),
+        "mean_weight": _number(weight),
+        "steady_torque": _number(torque / orbit.torque_ratio),
+        "steady_weight": _number(weight / orbit.weight_ratio),
+        "held_fraction": _number(orbit.held),
+        "lifted_fraction": _number(orbit.lifted),
+        "periodic": orbit.periodic,
         "orbit": {
             "settles": orbit.settles,
             "periodic": orbit.periodic,
@@ -59,11 +88,32 @@ def motion_fields(found: DrillingMotion) -> dict[str, Any]:
     }
 
 
+def _response_fields(response: BitResponse, units: Units) -> dict[str, Any]:
+    value = response.value * units.response
+    return {
+        "frequency": response.frequency / units.turn,
+        "amplitude": response.amplitude,
+        "real": _number(value.real),
+        "imag": _number(value.imag),
+        "error": _number(response.error * units.response),
+        "mean_torque": _number(response.torque * units.torque),
+        "mean_weight": _number(response.weight * units.weight),
+        "held_fraction": _number(response.held),
+        "lifted_fraction": _number(response.lifted),
+        "broken": None if response.broken is None else str(response.broken),
+    }
+
+
 def _mode_fields(swing: ModeSwing, units: Units) -> dict[str, Any]:
     mode = swing.mode
     return {
         "number": mode.number,
-        "frequency": mode.root.imag / units.time,
+        "frequency": mode.root.imag / units.turn,
+        "damping": _damping_left(swing, units),
+        "swings": [
+            {"amplitude": each.amplitude, "attracts": each.kind == "swing"}
+            for each in swing.crossings
+        ],
         "growth_rate": mode.root.real / units.time,
         "own_damping": mode.damping * units.response,
         "amplitudes": [_at_fields(each, swing, units) for each in swing.at],
@@ -74,12 +124,19 @@ def _mode_fields(swing: ModeSwing, units: Units) -> dict[str, Any]:
     }
 
 
+def _damping_left(swing: ModeSwing, units: Units) -> float | None:
+    """Return the damping left at the smallest amplitude at which H is known."""
+    left = zip(swing.damping_left.tolist(), swing.at, strict=True)
+    known = [value for value, each in left if math.isfinite(each.response.error)]
+    return known[0] * units.response if known else None
+
+
 def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
     response = each.response
     value = response.value * units.response
     return {
         "amplitude": each.amplitude,
-        "frequency": response.frequency / units.time,
+        "frequency": response.frequency / units.turn,
         "response_re": _number(value.real),
         "response_im": _number(value.imag),
         "response_error": _number(response.error * units.response),
@@ -118,6 +175,11 @@ def motion_summary(found: DrillingMotion) -> str:
 
 
 def _orbit_text(orbit: AxialOrbit, units: Units) -> str:
+    """Return what is told of the orbit, in lines of 80 columns."""
+    return textwrap.fill(_orbit_told(orbit, units), 80, break_on_hyphens=False)
+
+
+def _orbit_told(orbit: AxialOrbit, units: Units) -> str:
     if orbit.broken is not None:
         return f"Axial orbit at steady rotation: none; {orbit.broken.sentence}."
     if orbit.settles:
@@ -288,6 +350,28 @@ def band_fields(found: BitBand) -> dict[str, Any]:
         "growth_rate": growth / units.time,
         "growing_roots": found.count_growing(),
     }
+
+
+def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
+    """Return what is told of H at frequencies of one's own on a terminal."""
+    units = units_of(found.case)
+    rig = bool(units.rate_name)
+    lines = [
+        _orbit_text(found.orbit, units),
+        "",
+        f"H{f', {units.response_name}' if rig else ''}, of a rotation imposed whole",
+        f"{'Hz' if rig else 'ω':>9} {'A':>7} {'Re H':>9} {'Im H':>9} {'±':>7}",
+    ]
+    for each in responses:
+        place = f"{each.frequency / units.turn:9.4g} {each.amplitude:7.3f}"
+        if each.broken is not None:
+            lines.append(f"{place} {each.broken.sentence}")
+            continue
+        value, error = each.value * units.response, each.error * units.response
+        lines.append(f"{place} {value.real:9.4g} {value.imag:9.4g} {error:7.2g}")
+    for swing in found.modes:
+        lines += ["", *_mode_lines(swing, units)]
+    return "\n".join(lines)
 
 
 def band_summary(found: BitBand) -> str:

@@ -261,12 +261,26 @@ def test_command_line(capsys, tmp_path):
     assert picture.stat().st_size > 5000
     (mode,) = fields["modes"]
     assert mode["own_damping"] == pytest.approx(32.9)
-    assert mode["frequency"] == pytest.approx(math.sqrt(938.0 / 116.0), rel=2e-3)
+    assert mode["frequency"] == pytest.approx(math.sqrt(938.0 / 116.0) / (2.0 * math.pi), rel=2e-3)
     small = mode["amplitudes"][0]
     expected = fixed_step_response(rig_point(120, 20).operating_point(), 1.0, 0.03)
     assert small["response_re"] == pytest.approx(expected.real * UNIT, abs=1.0)
     assert small["damping_left"] == pytest.approx(32.9 + small["response_re"])
     assert 0.1 < fields["orbit"]["held_fraction"] < 0.3
+    assert fields["steady_torque"] == pytest.approx(fields["mean_torque"], rel=0.1)
+    assert mode["damping"] == pytest.approx(small["damping_left"])
+    status, said = run("--frequency", "0.45 Hz", "--amplitude", "0.03", "--json")
+    fields = json.loads(said.out)
+    (told,) = fields["response"]
+    assert told["frequency"] == pytest.approx(0.45)
+    assert told["real"] == pytest.approx(-19.5, abs=max(0.5, told["error"]))
+    assert told["imag"] == pytest.approx(8.1, abs=max(0.5, told["error"]))
+    assert fields["periodic"] is True
+    assert fields["modes"][0]["swings"] == []
+    for wrong in (["--frequency", "0.45"], ["--frequency", "fast Hz"]):
+        status, said = run(*wrong)
+        assert status == 2
+        assert "--frequency" in said.err
     status, said = run("--amplitudes", "0.03")
     assert status == 0
     assert "Small swings decay" in said.out
