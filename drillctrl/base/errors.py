@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -39,6 +40,28 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.parameter, self.value, self.permitted)
+
+
+@contextlib.contextmanager
+def blamed_on(source: str, typed: Mapping[str, tuple[str, object]]) -> Iterator[None]:
+    """Name where a value stands, and how it is written there, in messages about it.
+
+    Parameters
+    ----------
+    source : str
+        A file, or a part of one.
+    typed : mapping
+        Parameter → what it is called there and what is written, in units of its own.
+    """
+    try:
+        yield
+    except InputError as error:
+        if error.parameter not in typed:
+            raise
+        (key, value), permitted = typed[error.parameter], error.permitted
+        if isinstance(value, str) and value != error.value:
+            permitted = f"{permitted} in SI units"
+        raise InputError(f"{key} in {source}", value, permitted) from None
 
 
 class UndecidedError(InputError):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from drillctrl.base import units
-from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
 from drillctrl.base.files import check_regular, write_text
 from drillctrl.base.units import Dimension
 
@@ -197,7 +197,8 @@ def rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
             values[key] = value
         else:
             values[key] = units.to_si(f"{key} in {source}", value, dimension)
-    return Rig(**values)
+    with blamed_on(source, {key: (key, value) for key, value in data.items()}):
+        return Rig(**values)
 
 
 def save_rig(rig: Rig, path: str | Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from drillctrl.base import units
-from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
 from drillctrl.base.files import check_regular
 from drillctrl.base.units import Dimension
 from drillctrl.drilling.rig import PRESETS as LUMPED_PRESETS
@@ -59,6 +59,8 @@ _OPTIONAL = (
     *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
     *("torsional", "axial", "kelvin_voigt"),
 )
+# Attributes of a rig, and what they are called in a file.
+_CALLED = {"bit_radius": "diameter", "bit_geometry": "geometry", "rock_strength": "strength"}
 # Numbers in the unit that the format names.
 _BARE = ("blades", "torsional", "axial", "kelvin_voigt")
 _COLUMNS: dict[str, Dimension | None] = {
@@ -145,15 +147,21 @@ def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
         if key in given
     })  # fmt: skip
     mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
-    return string_rig(
-        DrillString(_sections(data["sections"], path), damping, mud, ropes),
-        drive=DriveMachine(**drive) if drive else None,
-        bit_radius=0.5 * diameter,
-        bit_geometry=bit.pop("geometry"),
-        rock_strength=rock["strength"],
-        contact_strength=rock["contact_strength"],
-        **bit,
-    )
+    string = DrillString(_sections(data["sections"], path), damping, mud, ropes)
+    typed = {key: (f"{part}.{key}", value) for part in ("bit", "rock", "top_drive")
+             for key, value in data.get(part, {}).items()}  # fmt: skip
+    for parameter, key in _CALLED.items():
+        typed[parameter] = typed.pop(key, (key, None))
+    with blamed_on(str(path), typed):
+        return string_rig(
+            string,
+            drive=DriveMachine(**drive) if drive else None,
+            bit_radius=0.5 * diameter,
+            bit_geometry=bit.pop("geometry"),
+            rock_strength=rock["strength"],
+            contact_strength=rock["contact_strength"],
+            **bit,
+        )
 
 
 def _check_keys(
