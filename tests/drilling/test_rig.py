@@ -108,7 +108,7 @@ def test_a_bad_toml_file_is_refused_by_name(tmp_path):
         text.replace('bit_radius = "0.108 m"\n', ""): "bit_radius",
         text.replace('"0.108 m"', '"0.108 kg"'): "must be a length",
         text.replace('"0.108 m"', "0.108"): "with its unit",
-        text.replace('"34000.0 kg"', '"-1 t"'): r"mass in .*rig.toml = -1 t: must be .* in SI units",
+        text.replace('"34000.0 kg"', '"-1 t"'): r"mass in .*rig.toml = -1 t: .* in SI units",
         text.replace("blades = 4", "blades = 6.5"): r"blades in .*rig.toml = 6.5: must be a whole",
         text[:40]: "must be",
         "mass = ": "valid TOML",
