@@ -177,7 +177,8 @@ def test_controllers_on_the_command_line(capsys, tmp_path):
         with pytest.raises(SystemExit) as stop:
             cli.main([*base, "--out", out])
         assert stop.value.code == 2
-    assert {p.name for p in tmp_path.iterdir()} == {"gains.c", "gains.h", "gains.st"}
+    beside = {"gains_bench.st", "gains.vectors.csv"}
+    assert {p.name for p in tmp_path.iterdir()} == {"gains.c", "gains.h", "gains.st", *beside}
     assert "--period = (missing)" in capsys.readouterr().err
 
 
