@@ -174,7 +174,9 @@ class ReducedLoops:
         """Do the same with Δ itself."""
         late = _late(self.delays, s)
         delta = self._matrices(s, late)
-        sign, size = np.linalg.slogdet(delta)
+        # Where Δ is singular some versions of numpy warn.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sign, size = np.linalg.slogdet(delta)
         if not with_slope:
             return sign, size, np.zeros(s.shape, dtype=complex)
         late *= self.delays[:, None]

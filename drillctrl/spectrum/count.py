@@ -114,7 +114,9 @@ class _SmallLoop:
     def phase_and_slope(self, s: ComplexArray) -> tuple[FloatArray, ComplexArray]:
         """Return arg det Δ and (det Δ)'/det Δ; infinite or NaN where Δ is singular."""
         delta, change = characteristic.matrix_and_derivative(self.system, s)
-        sign, _ = np.linalg.slogdet(delta)
+        # Where Δ is singular some versions of numpy warn.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sign, _ = np.linalg.slogdet(delta)
         return np.arctan2(sign.imag, sign.real), characteristic.trace_ratio(delta, change)
 
 
