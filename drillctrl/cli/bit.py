@@ -108,6 +108,8 @@ def bit_command(
     if band and along is not None:
         raise InputError("--along", along, "left out with --band")
     if along is not None:
+        if imposed:
+            raise InputError("--imposed", "given", "left out with --along")
         _along(where, along, wanted, modes, workers, rig_name(point), as_json, out, plot)
         return
     if band:
@@ -198,11 +200,14 @@ def _read_frequency(text: str, where: Any) -> float:
     except ValueError:
         value = math.nan
     if rig is None:
-        if unit or not math.isfinite(value):
-            raise InputError("--frequency", text, "a number ω, or a rig to go with its unit")
+        if unit or not 0.0 < value <= 1e3:
+            wanted = "a number ω in (0, 1000], or a rig to go with its unit"
+            raise InputError("--frequency", text, wanted)
         return value
-    if per_unit is None or not math.isfinite(value):
-        raise InputError("--frequency", text, "a number with its unit: '0.45 Hz' or '2.83 rad/s'")
+    if per_unit is None or not 0.0 < value * per_unit * rig.time_scale <= 1e3:
+        most = 1e3 / (2.0 * math.pi * rig.time_scale)
+        wanted = f"a frequency with its unit, such as '0.45 Hz' or '2.83 rad/s', to {most:.3g} Hz"
+        raise InputError("--frequency", text, wanted)
     return value * per_unit * rig.time_scale
 
 

@@ -141,7 +141,9 @@ def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
         "response_im": _number(value.imag),
         "response_error": _number(response.error * units.response),
         "response_scatter": _number(response.scatter * units.response),
-        "damping_left": _number(swing.mode.damping * units.response + value.real),
+        "damping_left": _number(swing.mode.damping * units.response + value.real)
+        if math.isfinite(response.error)
+        else None,
         "growth_rate": _number(each.root.real / units.time),
         "growth_rate_error": _number(each.error / units.time),
         "sign": each.sign,
@@ -265,7 +267,10 @@ def along_fields(found: ModeAlong) -> dict[str, Any]:
             {
                 "value": float(value),
                 "amplitude": each.amplitude,
-                "damping_left": _number(float(left) * units.response),
+                # Where H is not known, neither is this.
+                "damping_left": _number(float(left) * units.response)
+                if math.isfinite(each.error)
+                else None,
                 "growth_rate": _number(each.root.real / units.time),
                 "growth_rate_error": _number(each.error / units.time),
                 "sign": each.sign,

@@ -28,7 +28,7 @@ from drillctrl import (
     torsional_threshold,
 )
 from drillctrl.drilling.case import as_case
-from drillctrl.motion.report import along_fields, along_summary
+from drillctrl.motion.report import along_fields, along_summary, motion_fields
 from drillctrl.motion.torsion import forced_speed, ripple_of
 from drillctrl.simulation.status import Outcome
 from tests.motion.fixed_step import fixed_step_response
@@ -277,7 +277,7 @@ def test_command_line(capsys, tmp_path):
     assert told["imag"] == pytest.approx(8.1, abs=max(0.5, told["error"]))
     assert fields["periodic"] is True
     assert fields["modes"][0]["swings"] == []
-    for wrong in (["--frequency", "0.45"], ["--frequency", "fast Hz"]):
+    for wrong in (["--frequency", "0.45"], ["--frequency", "fast Hz"], ["--frequency", "0 Hz"]):
         status, said = run(*wrong)
         assert status == 2
         assert "--frequency" in said.err
@@ -316,6 +316,10 @@ def test_a_bit_that_swings_of_itself_has_no_answer():
     assert bouncing.error == math.inf
     (mode,) = torsional_modes(rig_point(60, 20))
     assert mode_at(rig_point(60, 20), mode, 0.03, most_periods=40).sign == 0
+    found = drilling_motion(rig_point(60, 20), (0.03,), most_periods=40)
+    (told,) = motion_fields(found)["modes"][0]["amplitudes"]
+    assert told["damping_left"] is None
+    assert told["growth_rate"] is None
     quiet = bit_response(rig_point(120, 20), 1.0, 0.03, ripple=True, most_periods=40)
     assert quiet.rippled < 0.03
 
