@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +62,8 @@ class FeedbackStructure:
         If shapes do not fit, a bound is not finite, bounds are swapped, or a tie names no
         free gain or leaves its leader no room.
     """
+
+    made_by: ClassVar[str] = "preset_structure('case1')"
 
     name: str
     outputs: tuple[str, ...]

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.drilling import ASKED, Drilling
@@ -30,6 +31,7 @@ from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
 
 
+@checks_kinds
 def design(
     point: Where,
     structure: str | FeedbackStructure = "case1",
@@ -151,6 +153,7 @@ def _meets(
     )
 
 
+@checks_kinds
 def analyze(
     point: Where,
     structure: str | FeedbackStructure | None = None,

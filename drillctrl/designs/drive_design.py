@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.designs.design import analyze
 from drillctrl.designs.result import Analysis
 from drillctrl.drilling.case import as_case
@@ -111,6 +112,7 @@ class DriveDesign:
         return self.found.plot()
 
 
+@checks_kinds
 def design_drive(
     where: RigPoint | Rig,
     structure: str,

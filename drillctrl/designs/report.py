@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from drillctrl.base import units
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none, set_out
 from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
@@ -116,6 +117,7 @@ class Report:
         return set_out(lines)
 
 
+@checks_kinds
 def report(result: Analysis, progress: Progress | None = None) -> Report:
     """Find out what a loop stands, and what would be better or would help.
 

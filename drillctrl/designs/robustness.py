@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none
 from drillctrl.designs.fragility import Fragility, fragility, perturbed_plants
 from drillctrl.designs.margins import point_margins
@@ -97,6 +98,7 @@ def robustness_of(result: Analysis) -> Robustness:
     )
 
 
+@checks_kinds
 def robust_alternative(result: Analysis, give_up: float = GIVE_UP) -> Analysis:
     """Return gains that decay almost as fast, and faster when something is off.
 

@@ -8,11 +8,12 @@ import math
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
 from drillctrl.base.files import check_regular, write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.units import Dimension
 
 STANDARD_GRAVITY = 9.80665
@@ -68,6 +69,8 @@ class Rig:
     InputError
         If a value is not finite or not in its range.
     """
+
+    made_by: ClassVar[str] = "table1()"
 
     mass: float = _parameter(units.MASS)
     inertia: float = _parameter(units.INERTIA)
@@ -201,6 +204,7 @@ def rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
         return Rig(**values)
 
 
+@checks_kinds
 def save_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig of lumped numbers to a TOML file that `load_rig` reads back without loss.
 

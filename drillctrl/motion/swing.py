@@ -13,6 +13,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import si_scale
@@ -182,6 +183,7 @@ class DrillingMotion:
         )
 
 
+@checks_kinds
 def drilling_motion(
     where: Where,
     amplitudes: Sequence[float] = AMPLITUDES,
@@ -233,6 +235,7 @@ def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> floa
     return float(np.ptp(speed)) / (2.0 * point.omega0)
 
 
+@checks_kinds
 def mode_at(
     where: Where, mode: TorsionalMode, amplitude: float, *, ripple: bool = True, **options: Any
 ) -> ModeAt:

@@ -12,6 +12,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import changed_by
@@ -143,6 +144,7 @@ class ModeAlong:
         )
 
 
+@checks_kinds
 def torsional_threshold(
     where: Where,
     along: str = "speed",

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
@@ -26,7 +27,7 @@ LAW_LOOP = FeedbackStructure(
 )  # fmt: skip
 
 
-@takes_rig_point
+@checks_kinds
 def drive_controller(
     where: RigPoint, control: DriveControl, *, period: float | None = None
 ) -> Controller:
@@ -82,7 +83,7 @@ def drive_controller(
     )
 
 
-@takes_rig_point
+@checks_kinds
 def law_controller(
     where: RigPoint,
     control: DriveControl,

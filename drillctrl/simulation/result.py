@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +47,8 @@ class Simulation(Trace):
     rig : Rig or None
         Where the run was of a `RigPoint`.
     """
+
+    made_by: ClassVar[str] = "simulate returns"
 
     controller: Controller | None
     scenario: Scenario

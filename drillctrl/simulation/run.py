@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
@@ -99,6 +100,7 @@ def checked_run(
     return scenario, duration, rtol, atol, max_steps
 
 
+@checks_kinds
 def simulate(
     where: Where,
     controller: Controller | None = None,

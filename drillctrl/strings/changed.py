@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
@@ -38,6 +39,7 @@ def permitted_range(string: DrillString, name: str) -> tuple[float, float]:
     return (string.shallowest, DEEPEST) if name == "depth" else (0.0, HEAVIEST_MUD)
 
 
+@checks_kinds
 def changed_rig(rig: Rig, depth: float | None = None, mud: float | None = None) -> StringRig:
     """Return a rig that has drilled to another depth, or with another mud.
 

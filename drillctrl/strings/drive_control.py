@@ -11,7 +11,7 @@ So Z(s) = (J s + P A)/(1 + P B), torque per speed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -148,6 +148,8 @@ class DriveControl:
         If the law differentiates through a delay and no filter: there is no such loop of retarded
         type, and high frequencies would decide.
     """
+
+    made_by: ClassVar[str] = "drive_control makes of a rig"
 
     name: str
     machine: DriveMachine

@@ -19,6 +19,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
@@ -321,6 +322,7 @@ def _drive(machine: DriveMachine, pipe: float, rate: float, s: ComplexArray) -> 
     return _Drive(machine.inertia * s, path * speed, path * torque, s / rate)
 
 
+@checks_kinds
 def dynamic_drive_control(
     line: Line,
     machine: DriveMachine,

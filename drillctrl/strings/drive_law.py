@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import Coefficients
@@ -191,6 +192,7 @@ def companion(law: Transfer) -> tuple[FloatArray, FloatArray, FloatArray, float]
     return a, b, (above - through * below)[:0:-1], through
 
 
+@checks_kinds
 def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = None) -> Plant:
     """Return the plant of a rig that is turned by a drive under a law.
 

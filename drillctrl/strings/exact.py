@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.linear import bit_response
 from drillctrl.strings.at_bit import StringAtBit, string_at_bit
@@ -139,6 +140,7 @@ class ExactLoop:
         raise InputError("near", near, "close to a root")
 
 
+@checks_kinds
 def exact_loop(where: Where, top: TopStiffness | None = None) -> ExactLoop:
     """Return the exact loop of a case whose string is one of pipe.
 

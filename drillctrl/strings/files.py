@@ -13,6 +13,7 @@ from typing import Any
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
 from drillctrl.base.files import check_regular
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.units import Dimension
 from drillctrl.drilling.rig import PRESETS as LUMPED_PRESETS
 from drillctrl.drilling.rig import Rig, read_toml, rig_from_mapping, table1
@@ -90,6 +91,7 @@ _ALSO = {
 }
 
 
+@checks_kinds
 def load_rig(source: str | Path) -> Rig:
     """Load a rig by the name of a preset or from a TOML file.
 
@@ -191,6 +193,7 @@ def _sections(given: Any, path: Path) -> tuple[Section, ...]:
     return tuple(found)
 
 
+@checks_kinds
 def read_tally(path: str | Path) -> tuple[Section, ...]:
     """Return the sections of a string from a CSV file, from the top down.
 

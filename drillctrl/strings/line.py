@@ -7,7 +7,7 @@ carries (displacement, force) from the upper end to the lower one, at any comple
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -81,6 +81,8 @@ class Stretch(NamedTuple):
 @dataclass(frozen=True)
 class Line:
     """Stretches from the top end to the bit."""
+
+    made_by: ClassVar[str] = "the torsion of a DrillString"
 
     stretches: tuple[Stretch, ...]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.strings.check import AXIAL_BAND, TORSIONAL_BAND, Mode, string_modes
@@ -161,6 +162,7 @@ def turned_by(case: Case) -> DriveControl | None:
     return laws[0].__dict__["control"] if laws else None
 
 
+@checks_kinds
 def named_roots(
     where: Where,
     structure: FeedbackStructure | None = None,

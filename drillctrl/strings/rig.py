@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.rig import Rig
@@ -45,6 +46,8 @@ class StringRig(Rig):
     InputError
         If a lumped number is not what follows from the string.
     """
+
+    made_by: ClassVar[str] = "string_preset('vertical-3000')"
 
     string: DrillString = field(kw_only=True)
     drive: DriveMachine | None = field(default=None, kw_only=True)
@@ -89,6 +92,7 @@ def lumped_values(string: DrillString) -> dict[str, float]:
     return dict(zip(_LUMPED, values, strict=True))
 
 
+@checks_kinds
 def string_rig(
     string: DrillString, *, drive: DriveMachine | None = None, **bit_and_rock: Any
 ) -> StringRig:
@@ -107,6 +111,7 @@ def string_rig(
     return StringRig(**values, string=string, drive=drive)
 
 
+@checks_kinds
 def lump(rig: Rig) -> Rig:
     """Return a rig of the paper's kind: one axial and one torsional degree of freedom.
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_rules import drive_poles
 from drillctrl.strings.elements import ELEMENT_LENGTH, elements, free_modes
@@ -98,6 +99,7 @@ def bit_impedance(line: Line, control: DriveControl | None, s: npt.ArrayLike) ->
     return np.asarray(line.bit_stiffness(at, top) / at)
 
 
+@checks_kinds
 def critical_slopes(
     line: Line, control: DriveControl | None, frequency: float, step: float = 1e-3
 ) -> tuple[CriticalSlope, ...]:
@@ -164,6 +166,7 @@ def mode_bands(line: Line, count: int) -> tuple[FloatArray, FloatArray]:
     return known[:count], 0.5 * (known[1:] + known[:-1])
 
 
+@checks_kinds
 def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tuple[ModeSlope, ...]:
     """Return the critical slope of each of the first modes of torsion.
 
@@ -193,6 +196,7 @@ def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tup
     return tuple(found)
 
 
+@checks_kinds
 def weakest_slope(
     line: Line, control: DriveControl | None, highest: float = HIGHEST
 ) -> CriticalSlope | None:
@@ -224,6 +228,7 @@ def weakest_slope(
     return min(grown, key=lambda c: c.slope, default=None)
 
 
+@checks_kinds
 def count_growing(
     line: Line, control: DriveControl, slope: float = 0.0, highest: float = 0.0
 ) -> int:
@@ -273,6 +278,7 @@ def drive_is_stable(line: Line, control: DriveControl) -> bool:
     return count_growing(line, control) == 0
 
 
+@checks_kinds
 def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) -> float:
     """Return by how much later the drive may act before it is unstable by itself, s.
 

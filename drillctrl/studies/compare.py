@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.drilling import Drilling, Swing, measured_swings
@@ -99,6 +100,7 @@ def _subjects(
     return subjects
 
 
+@checks_kinds
 def compare(
     point: Where,
     structures: Sequence[str | FeedbackStructure] = ("p", "case1", "pd", "case2"),

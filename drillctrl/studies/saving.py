@@ -18,6 +18,7 @@ import numpy as np
 from drillctrl.base.codec import decode, encode
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import check_regular, write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure, Tie
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs import drilling, loop_analysis, mode_shift, trials, verdict, worst_case
@@ -60,6 +61,7 @@ _PARTS: tuple[type, ...] = (
 _CLASSES = {kind.__name__: kind for kind in _PARTS}
 
 
+@checks_kinds
 def save_result(result: Design | Analysis | Simulation | Campaign, path: str | Path) -> None:
     """Write a result to a JSON file, whole or not at all; `load_result` reads it.
 
@@ -97,6 +99,7 @@ def save_result(result: Design | Analysis | Simulation | Campaign, path: str | P
     write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
+@checks_kinds
 def load_result(
     path: str | Path, plant: Plant | None = None
 ) -> Design | Analysis | Simulation | Campaign:

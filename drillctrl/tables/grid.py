@@ -6,13 +6,15 @@ import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.case import Case, as_case
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
@@ -88,6 +90,7 @@ class Axis:
         return f"{self.name.replace('_', ' ')} {numbers} {unit}".strip()
 
 
+@checks_kinds
 def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
     """Return evenly spaced values, both ends included."""
     for end in (low, high):
@@ -118,6 +121,8 @@ class Grid:
     InputError
         If axes and reference do not fit, or there are more than `MAX_NODES` nodes.
     """
+
+    made_by: ClassVar[str] = "dimensionless_grid makes of a point"
 
     axes: tuple[Axis, Axis, Axis]
     reference: OperatingPoint | Rig
@@ -219,11 +224,12 @@ class Grid:
         return np.column_stack([speed, feed, strength])
 
 
+@checks_kinds
 def dimensionless_grid(
     omega0: Axis | float,
     delta0: Axis | float,
     psi: Axis | float = 14.0,
-    reference: OperatingPoint | Case | None = None,
+    reference: Where | None = None,
     *,
     parameter: Axis | None = None,
 ) -> Grid:
@@ -263,6 +269,7 @@ def dimensionless_grid(
     return Grid((axes[0], axes[1], third), here, plant or paper_plant())
 
 
+@checks_kinds
 def rig_grid(
     rig: Rig | RigPoint | Case,
     rotary_speed: Axis | float,

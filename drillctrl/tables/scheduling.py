@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
@@ -38,6 +39,7 @@ def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> Floa
     return np.column_stack([omega0, rate / omega0, psi])
 
 
+@checks_kinds
 def scheduled(
     table: GainTable,
     point: OperatingPoint,
