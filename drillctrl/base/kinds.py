@@ -5,10 +5,10 @@ from __future__ import annotations
 import collections.abc
 import functools
 import inspect
-import os
 import types
 import typing
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
 from drillctrl.base.errors import InputError
@@ -17,6 +17,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 # What is looked at when it is read as a number or an array, with the range that is permitted.
 _READ_LATER = (bool, int, float, complex, object)
+_SEQUENCES = (collections.abc.Sequence, tuple, list)
 
 
 def checks_kinds(function: Callable[P, R]) -> Callable[P, R]:
@@ -33,7 +34,7 @@ def checks_kinds(function: Callable[P, R]) -> Callable[P, R]:
     names = tuple(inspect.signature(function).parameters)
 
     @functools.cache
-    def kinds() -> dict[str, Any]:
+    def kinds() -> dict[str, _Kind]:
         # At the first call: modules that annotations name have been imported by then.
         return {name: kind for name in names if (kind := _annotated(function, name)) is not None}
 
@@ -41,55 +42,65 @@ def checks_kinds(function: Callable[P, R]) -> Callable[P, R]:
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         wanted = kinds()
         for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-            if name in wanted and not _is(value, wanted[name]):
-                raise InputError(name, _told(value), f"{_named(wanted[name])}{_hint(wanted[name])}")
+            kind = wanted.get(name)
+            if kind is not None and not kind.fits(value):
+                raise InputError(name, _told(value), kind.wanted())
         return function(*args, **kwargs)
 
     return checked
 
 
-def _annotated(function: Callable[..., Any], name: str) -> Any:
+@dataclass(frozen=True)
+class _Kind:
+    """Alternatives, of which a value is to be one."""
+
+    classes: tuple[type, ...]
+    # A list does where a tuple is asked for, an array too.
+    sequence: bool
+
+    def fits(self, value: object) -> bool:
+        if isinstance(value, self.classes):
+            return True
+        # A word is no sequence of words.
+        return (
+            self.sequence
+            and isinstance(value, collections.abc.Iterable)
+            and not isinstance(value, str | bytes)
+        )
+
+    def wanted(self) -> str:
+        """Say it as the end of "must be ...", and where one gets it from if its class knows."""
+        *others, last = dict.fromkeys(_named(part) for part in self.classes)
+        named = f"{', '.join(others)} or {last}" if others else last
+        hints = [part.made_by for part in self.classes if hasattr(part, "made_by")]
+        return f"{named}, such as {hints[0]}" if hints else named
+
+
+def _annotated(function: Callable[..., Any], name: str) -> _Kind | None:
     """Return the kind that an annotation names, or None where it names none that binds."""
     parameter = inspect.signature(function).parameters[name]
     if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
         return None
     try:
-        kind = eval(parameter.annotation, function.__globals__)
+        parts = _parts(eval(parameter.annotation, function.__globals__))
     except NameError:
         # Named for the type checker alone: of a library that is not imported here.
         return None
-    return kind if all(_binds(part) for part in _parts(kind)) else None
+    if not all(_binds(part) for part in parts):
+        return None
+    return _Kind(parts, any(part in _SEQUENCES for part in parts))
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:
-    """Return the alternatives of a kind."""
+    """Return the alternatives of a kind, each without what it is a sequence or mapping of."""
     if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
         return tuple(part for one in typing.get_args(kind) for part in _parts(one))
-    return (types.NoneType if kind is None else _base(kind),)
-
-
-def _base(kind: Any) -> Any:
-    """Return the class of a generic kind."""
-    return typing.get_origin(kind) or kind
+    return (types.NoneType if kind is None else typing.get_origin(kind) or kind,)
 
 
 def _binds(part: Any) -> bool:
     """Whether values can be told to be of a kind."""
-    unclear = part in _READ_LATER or not isinstance(part, type)
-    return not unclear and not getattr(part, "_is_protocol", False)
-
-
-def _is(value: object, kind: Any) -> bool:
-    return any(_fits(value, part) for part in _parts(kind))
-
-
-def _fits(value: object, part: Any) -> bool:
-    if part in (collections.abc.Sequence, tuple, list):
-        # A list does where a tuple is asked for, an array too; a word is no sequence of words.
-        return isinstance(value, collections.abc.Iterable) and not isinstance(value, str | bytes)
-    if part is os.PathLike:
-        return isinstance(value, str | os.PathLike)
-    return isinstance(value, part)
+    return isinstance(part, type) and part not in _READ_LATER and not hasattr(part, "_is_protocol")
 
 
 _WORDS: dict[Any, str] = {
@@ -103,21 +114,9 @@ _WORDS: dict[Any, str] = {
 }
 
 
-def _named(kind: Any) -> str:
-    """Say a kind as the end of "must be ..."."""
-    parts = dict.fromkeys(_WORDS.get(part) or _with_article(part.__name__) for part in _parts(kind))
-    *others, last = parts
-    return f"{', '.join(others)} or {last}" if others else last
-
-
-def _with_article(name: str) -> str:
-    return f"an {name}" if name[0] in "AEIOU" else f"a {name}"
-
-
-def _hint(kind: Any) -> str:
-    """Say where one gets it from, where its class knows."""
-    hints = [part.made_by for part in _parts(kind) if hasattr(part, "made_by")]
-    return f", such as {hints[0]}" if hints else ""
+def _named(part: type) -> str:
+    name = part.__name__
+    return _WORDS.get(part) or f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
 def _told(value: object) -> str:
