@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -63,7 +62,7 @@ class FeedbackStructure:
         free gain or leaves its leader no room.
     """
 
-    made_by: ClassVar[str] = "preset_structure('case1')"
+    made_by = "preset_structure('case1')"
 
     name: str
     outputs: tuple[str, ...]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -79,7 +78,7 @@ class DelaySystem:
         If shapes, delays or names do not fit, or a number is not finite.
     """
 
-    made_by: ClassVar[str] = "plant_system makes of a point"
+    made_by = "plant_system makes of a point"
 
     A0: FloatArray
     delayed: tuple[FloatArray, ...] = ()

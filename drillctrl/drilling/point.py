@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.rig import Rig
@@ -103,7 +103,7 @@ class RigPoint:
         V0 ≥ 0, m/s.
     """
 
-    made_by: ClassVar[str] = "RigPoint(table1(), speed, rate), in rad/s and m/s"
+    made_by = "RigPoint(table1(), speed, rate), in rad/s and m/s"
 
     rig: Rig
     rotary_speed: float

@@ -8,7 +8,7 @@ import math
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
@@ -70,7 +70,7 @@ class Rig:
         If a value is not finite or not in its range.
     """
 
-    made_by: ClassVar[str] = "table1()"
+    made_by = "table1()"
 
     mass: float = _parameter(units.MASS)
     inertia: float = _parameter(units.INERTIA)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +48,7 @@ class Simulation(Trace):
         Where the run was of a `RigPoint`.
     """
 
-    made_by: ClassVar[str] = "simulate returns"
+    made_by = "simulate returns"
 
     controller: Controller | None
     scenario: Scenario

@@ -11,7 +11,7 @@ So Z(s) = (J s + P A)/(1 + P B), torque per speed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -149,7 +149,7 @@ class DriveControl:
         type, and high frequencies would decide.
     """
 
-    made_by: ClassVar[str] = "drive_control makes of a rig"
+    made_by = "drive_control makes of a rig"
 
     name: str
     machine: DriveMachine

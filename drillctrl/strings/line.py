@@ -7,7 +7,7 @@ carries (displacement, force) from the upper end to the lower one, at any comple
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -82,7 +82,7 @@ class Stretch(NamedTuple):
 class Line:
     """Stretches from the top end to the bit."""
 
-    made_by: ClassVar[str] = "the torsion of a DrillString"
+    made_by = "the torsion of a DrillString"
 
     stretches: tuple[Stretch, ...]
 

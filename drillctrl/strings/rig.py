@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
@@ -47,7 +47,7 @@ class StringRig(Rig):
         If a lumped number is not what follows from the string.
     """
 
-    made_by: ClassVar[str] = "string_preset('vertical-3000')"
+    made_by = "string_preset('vertical-3000')"
 
     string: DrillString = field(kw_only=True)
     drive: DriveMachine | None = field(default=None, kw_only=True)

@@ -6,7 +6,6 @@ import functools
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -122,7 +121,7 @@ class Grid:
         If axes and reference do not fit, or there are more than `MAX_NODES` nodes.
     """
 
-    made_by: ClassVar[str] = "dimensionless_grid makes of a point"
+    made_by = "dimensionless_grid makes of a point"
 
     axes: tuple[Axis, Axis, Axis]
     reference: OperatingPoint | Rig
