@@ -60,7 +60,6 @@ from .drilling.plausibility import plausibility_notes as plausibility_notes
 from .drilling.point import OperatingPoint as OperatingPoint
 from .drilling.point import RigPoint as RigPoint
 from .drilling.rig import Rig as Rig
-from .drilling.rig import save_rig as save_rig
 from .drilling.rig import table1 as table1
 from .drilling.sensors import Filtered as Filtered
 from .drilling.sensors import Lagging as Lagging
@@ -180,6 +179,7 @@ from .strings.presets import string_preset as string_preset
 from .strings.rig import StringRig as StringRig
 from .strings.rig import lump as lump
 from .strings.rig import string_rig as string_rig
+from .strings.saving import save_rig as save_rig
 from .strings.section import Material as Material
 from .strings.section import Section as Section
 from .strings.section import ToolJoint as ToolJoint

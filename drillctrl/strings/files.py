@@ -32,7 +32,7 @@ _KINDS = {
     **{kind: kind for kind in KINDS},
     **{"dp": "pipe", "drill pipe": "pipe", "hwdp": "heavy-weight", "dc": "collar"},
 }
-_PARTS: dict[str, dict[str, Dimension | None]] = {
+PARTS: dict[str, dict[str, Dimension | None]] = {
     "bit": {
         "diameter": units.LENGTH,
         "blades": None,
@@ -64,7 +64,7 @@ _OPTIONAL = (
 _CALLED = {"bit_radius": "diameter", "bit_geometry": "geometry", "rock_strength": "strength"}
 # Numbers in the unit that the format names.
 _BARE = ("blades", "torsional", "axial", "kelvin_voigt")
-_COLUMNS: dict[str, Dimension | None] = {
+COLUMNS: dict[str, Dimension | None] = {
     "name": None,
     "type": None,
     "pipe": None,
@@ -122,9 +122,9 @@ def load_rig(source: str | Path) -> Rig:
 
 
 def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
-    _check_keys(data, ("sections", *_PARTS), str(path), _OPTIONAL_PARTS)
+    _check_keys(data, ("sections", *PARTS), str(path), _OPTIONAL_PARTS)
     found: dict[str, dict[str, Any]] = {}
-    for part, known in _PARTS.items():
+    for part, known in PARTS.items():
         given = data.get(part, {})
         if not isinstance(given, dict):
             raise InputError(f"{part} in {path}", given, f"a table, [{part}]")
@@ -228,8 +228,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
         names.append(_ALSO.get(name, name))
         behind.append(match[2])
     for name, title in zip(names, table[0], strict=True):
-        if name not in _COLUMNS:
-            raise InputError(f"column of {path}", title, f"one of {', '.join(_COLUMNS)}")
+        if name not in COLUMNS:
+            raise InputError(f"column of {path}", title, f"one of {', '.join(COLUMNS)}")
     sections = []
     for line, row in enumerate(table[1:], 2):
         where = f"row {line} of {path}"
@@ -241,17 +241,17 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
             if not value:
                 continue
             bare = re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", value)
-            cells[name] = f"{value} {unit}" if unit and bare and _COLUMNS[name] else value
+            cells[name] = f"{value} {unit}" if unit and bare and COLUMNS[name] else value
         sections.append(_section(cells, where))
     return tuple(sections)
 
 
 def _section(row: Mapping[str, Any], where: str) -> Section:
     for key in row:
-        if key not in _COLUMNS:
-            raise InputError(f"key in {where}", key, f"one of {', '.join(_COLUMNS)}")
+        if key not in COLUMNS:
+            raise InputError(f"key in {where}", key, f"one of {', '.join(COLUMNS)}")
     value: dict[str, Any] = {
-        key: given if _COLUMNS[key] is None else _si(f"{key} in {where}", given, _COLUMNS[key])
+        key: given if COLUMNS[key] is None else _si(f"{key} in {where}", given, COLUMNS[key])
         for key, given in row.items()
     }
     bought = pipe(str(row["pipe"])) if "pipe" in row else None
