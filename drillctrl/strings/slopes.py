@@ -6,6 +6,7 @@ speed swings undamped at s = iω where the impedance that the string shows it is
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ _GROWTH = 1e-4
 HIGHEST, _CLOSE, _CLOSER = 30.0, 4, 5.0
 # Share of J ω that the drive's feedback still has where nothing above needs to be looked at.
 _INERTIAL = 0.1
+# Samples across the width of a resonance.
+_WIDTHS = 10.0
 
 
 @dataclass(frozen=True)
@@ -241,7 +244,12 @@ def count_growing(
         Hz, modulus up to which roots are counted; by default where the drive is its inertia
         and nothing else.
     """
-    radius = 2.0 * np.pi * (highest or _inertial_frequency(control))
+    return _growing(line, control, slope, highest or _inertial_frequency(control))
+
+
+@functools.lru_cache(maxsize=64)
+def _growing(line: Line, control: DriveControl, slope: float, highest: float) -> int:
+    radius = 2.0 * np.pi * highest
     impedance = lowest_impedance(line)
 
     def characteristic(s: ComplexArray) -> ComplexArray:
@@ -285,7 +293,8 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
     control : DriveControl
         Of the drive.
     step : float
-        Hz between the samples; a resonance narrower than that is missed.
+        Hz between the samples, wider where damping makes all resonances wide; a narrower
+        resonance is missed.
     """
     if not drive_is_stable(line, control):
         return float("nan")
@@ -299,7 +308,7 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
         string = matrix[..., 1, 0] / (matrix[..., 1, 1] * s)
         return np.asarray(lag * (speed + torque * string) / (inertia * s + string))
 
-    at = np.arange(step, _inertial_frequency(control) + step, step)
+    at = _by_widths(line, step, _inertial_frequency(control))
     places, _ = sign_changes(lambda f: np.abs(loop(f)) - 1.0, at)
     if not places.size:
         return float("inf")
@@ -309,3 +318,21 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
     period = 2.0 * np.pi / omega
     late = late + period * np.ceil((delay - late) / period)
     return float(np.min(late) - delay)
+
+
+def _by_widths(line: Line, step: float, highest: float) -> FloatArray:
+    """Return frequencies, Hz, closer together than resonances are wide, unless a step is wider.
+
+    A wave that decays at the rate σ makes resonances as wide as σ/π.
+    """
+    pieces = [piece for stretch in line.stretches for piece in stretch.pieces if piece.mass]
+
+    def apart(f: float) -> float:
+        omega = 2.0 * np.pi * f
+        rates = [0.5 * (p.damping / p.mass + p.retardation * omega**2) for p in pieces]
+        return max(step, min(rates) / (_WIDTHS * np.pi))
+
+    at = [step]
+    while at[-1] < highest:
+        at.append(at[-1] + apart(at[-1]))
+    return np.array(at)
