@@ -16,7 +16,6 @@ from drillctrl.designs.drilling import (
     ControlledSwing,
     Drilling,
     Swing,
-    cases_around,
     controlled_swings,
     cost_of_gains,
     swing_families,
@@ -200,7 +199,7 @@ def tried(
             break
         (more,) = judged(case, [known[best]], MORE_STARTS)
         known[best] = verdict(known[best], before + more)
-        for there in cases_around(case, objective)[1:]:
+        for there in objective.around(case)[1:]:
             if known[best].harmful:
                 break
             (runs,) = judged(there, [known[best]], STARTS)

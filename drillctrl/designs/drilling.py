@@ -15,9 +15,8 @@ from drillctrl.base.text import finite_or_none
 from drillctrl.base.workers import spread_out
 from drillctrl.delay.structure import FeedbackStructure, no_control
 from drillctrl.delay.system import DelaySystem
-from drillctrl.designs.worst_case import box
+from drillctrl.designs.worst_case import cases_in_box, errors_of
 from drillctrl.drilling.case import Case
-from drillctrl.drilling.point import OperatingPoint
 from drillctrl.motion.loop import torsional_system
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, bit_response
 from drillctrl.motion.swing import mode_at
@@ -56,9 +55,9 @@ class Drilling(WorstLoop):
         Largest swing of the bit's speed, share of it, in (0, 0.95].
     modes : int
         So many of the slowest torsional modes.
-    psi, delta0, omega0 : float
-        Relative errors, 0 to 0.9, of the point, as in `WorstCase`: motions are looked at
-        there too.
+    psi, delta0, omega0, depth, mud : float
+        Relative errors, 0 to 0.9, of the point and of a real string's length and mud, as in
+        `WorstCase`: motions are looked at there too.
     """
 
     kick: float = 0.45
@@ -66,18 +65,19 @@ class Drilling(WorstLoop):
     psi: float = 0.0
     delta0: float = 0.0
     omega0: float = 0.0
+    depth: float = 0.0
+    mud: float = 0.0
     name = "drilling"
 
     def __post_init__(self) -> None:
         checked_number("kick", self.kick, 0.0, 0.95, open_low=True)
         checked_integer("modes", self.modes, 1, 20)
-        for name in ("psi", "delta0", "omega0"):
-            checked_number(f"{name} error", getattr(self, name), 0.0, 0.9)
+        for name, size in errors_of(self).items():
+            checked_number(f"{name} error", size, 0.0, 0.9)
 
-    def around(self, point: OperatingPoint) -> tuple[OperatingPoint, ...]:
-        """Return all points looked at, the given one first."""
-        sizes = {name: getattr(self, name) for name in ("psi", "delta0", "omega0")}
-        return (point, *box(point, sizes))
+    def around(self, case: Case) -> tuple[Case, ...]:
+        """Return all cases looked at, the given one first."""
+        return cases_in_box(self, case)
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
@@ -233,12 +233,6 @@ def largest_growth(swings: Sequence[Swing]) -> float:
     return max(known, default=float("nan"))
 
 
-def cases_around(case: Case, objective: Drilling) -> tuple[Case, ...]:
-    """Return the case and those about it that an objective looks at."""
-    _, here = case.physics(f"objective {objective.name}")
-    return (case, *(case.at(other) for other in objective.around(here)[1:]))
-
-
 def measured_swings(
     case: Case, objective: Drilling, executor: Executor | None = None
 ) -> tuple[Swing, ...]:
@@ -251,7 +245,7 @@ def measured_swings(
     """
     tasks = [
         (number, there, mode, amplitude)
-        for number, there in enumerate(cases_around(case, objective))
+        for number, there in enumerate(objective.around(case))
         for mode in torsional_modes(there, objective.modes)
         for amplitude in objective.amplitudes
     ]
@@ -287,7 +281,7 @@ def swing_families(
 
     Where no answer is known, they are of the string alone.
     """
-    cases = cases_around(case, objective)
+    cases = objective.around(case)
     known = [swing for swing in swings if swing.known]
     systems = [s for w in known for s in swing_systems(cases[w.point], w, structure.inputs)]
     if not systems:
@@ -342,7 +336,7 @@ def controlled_swings(
     gains: FloatArray,
 ) -> tuple[ControlledSwing, ...]:
     """Return what gains make of every swing whose answer is known."""
-    cases = cases_around(case, objective)
+    cases = objective.around(case)
     own = [{m.number: m.root.imag for m in torsional_modes(there, _MODES)} for there in cases]
     off = no_control(structure)
     found = []
@@ -389,7 +383,7 @@ def followed_swings(
     **options: Any,
 ) -> tuple[ControlledSwing, ...]:
     """Return `controlled_swings` with H measured at the frequency that the gains give a mode."""
-    cases = cases_around(case, objective)
+    cases = objective.around(case)
     moved = []
     for each in controlled_swings(case, objective, swings, structure, gains):
         swing = each.swing

@@ -209,7 +209,7 @@ def _transfer(piece: Piece, s: ComplexArray) -> tuple[_Matrix, ComplexArray]:
     x = np.sqrt(square)
     fallen = np.expm1(-2.0 * x)
     small = np.abs(x) < 1e-8
-    along = 1.0 + 0.5 * fallen
+    along = np.asarray(1.0 + 0.5 * fallen, dtype=complex)
     across = np.where(small, 1.0, -0.5 * fallen / np.where(small, 1.0, x))
     scaled = piece.length / k
     return _Matrix(along, scaled * across, square * across / scaled, along), x
