@@ -12,14 +12,9 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.workers import spread_out
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.drilling import (
-    ControlledSwing,
-    Drilling,
-    Swing,
-    controlled_swings,
-    cost_of_gains,
-    swing_families,
-)
+from drillctrl.designs.controlled_swings import ControlledSwing, controlled_swings
+from drillctrl.designs.drilling import Drilling
+from drillctrl.designs.swings import Swing, cost_of_gains, swing_families
 from drillctrl.designs.trials import MORE_STARTS, STARTS, UNDER_WAY, Trial, trial_run
 from drillctrl.designs.verdict import FAILURES, Verdict, judge, with_engagement
 from drillctrl.drilling.case import Case

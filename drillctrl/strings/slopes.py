@@ -126,6 +126,19 @@ def critical_slopes(
     return _crossings(line, control, np.arange(step, frequency + step, step))
 
 
+def _bands_and_crossings(
+    line: Line, control: DriveControl | None, count: int, highest: float | None = None
+) -> tuple[FloatArray, FloatArray, tuple[CriticalSlope, ...]]:
+    """Return `mode_bands`, and crossings up to their end or, by coarser samples, beyond."""
+    modes, ends = mode_bands(line, count)
+    step, near = float(modes[0]) / _PER_MODE, float(ends[-1])
+    if highest is None:
+        return modes, ends, critical_slopes(line, control, near, step)
+    near = min(near, highest)
+    at = np.concatenate([np.arange(step, near, step), np.arange(near, highest, _CLOSER * step)])
+    return modes, ends, _crossings(line, control, np.append(at, highest))
+
+
 def _crossings(
     line: Line, control: DriveControl | None, at: FloatArray
 ) -> tuple[CriticalSlope, ...]:
@@ -182,9 +195,7 @@ def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tup
         Number of modes, 1 to 20.
     """
     checked_integer("modes", count, 1, 20)
-    modes, ends = mode_bands(line, count)
-    step = float(modes[0]) / _PER_MODE
-    crossings = critical_slopes(line, control, float(ends[-1]), step)
+    modes, ends, crossings = _bands_and_crossings(line, control, count)
     most = lowest_impedance(line)
     found, low = [], 0.0
     for i, (mode, high) in enumerate(zip(modes.tolist(), ends.tolist(), strict=True)):
@@ -218,12 +229,8 @@ def weakest_slope(
         None where no slope below the impedance of the lowest stretch makes any of them grow.
     """
     checked_number("highest", highest, 0.0, 1e3, open_low=True)
-    modes, ends = mode_bands(line, _CLOSE)
-    step = float(modes[0]) / _PER_MODE
-    most, near = lowest_impedance(line), min(float(ends[-1]), highest)
-    at = np.concatenate([np.arange(step, near, step), np.arange(near, highest, _CLOSER * step)])
-    crossings = _crossings(line, control, np.append(at, highest))
-    grown = [c for c in crossings if c.grows and 0.0 < c.slope < most]
+    _, _, crossings = _bands_and_crossings(line, control, _CLOSE, highest)
+    grown = [c for c in crossings if c.grows and 0.0 < c.slope < lowest_impedance(line)]
     return min(grown, key=lambda c: c.slope, default=None)
 
 
