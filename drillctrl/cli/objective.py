@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 # Options that belong to one objective, and the parameter of it that they set.
-_ERRORS = {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"}
+_ERRORS = {f"{name}_error": name for name in ("psi", "delta0", "omega0", "depth", "mud")}
 _BELONGS = {
     "semidiscrete": {"m": "m", "order": "order"},
     "worst-case": _ERRORS,
@@ -46,6 +46,14 @@ def objective_options(command: Command) -> Command:
         ),
         click.option("--delta0-error", type=float, help="Relative (worst-case, drilling; 0)."),
         click.option("--omega0-error", type=float, help="Relative (worst-case, drilling; 0)."),
+        click.option(
+            "--depth-error",
+            type=float,
+            help="Relative, of the string's length (worst-case, drilling: 0; dynamic-1 …: 0.2).",
+        ),
+        click.option(
+            "--mud-error", type=float, help="Relative, of its density (worst-case, drilling; 0)."
+        ),
         click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
         click.option("--kick", type=float, help="Largest swing of the speed (drilling; 0.45)."),
         click.option("--modes", type=int, help="Torsional modes (drilling; default 1)."),

@@ -114,9 +114,8 @@ def design(
     family = loop_family(case.system(chosen.inputs), chosen)
     others = []
     if isinstance(objective, WorstCase):
-        _, here = case.physics(f"objective {objective.name}")
-        for other in objective.around(here)[1:]:
-            others.append(loop_family(case.at(other).system(chosen.inputs), chosen))
+        for other in objective.around(case)[1:]:
+            others.append(loop_family(other.system(chosen.inputs), chosen))
     solution = problem.solve(family, objective, requirements, others, seed)
     result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]

@@ -15,16 +15,10 @@ from drillctrl.base.workers import open_executor
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.authority import Candidate, between, candidates, irregular, tried
-from drillctrl.designs.drilling import (
-    ASKED,
-    Drilling,
-    OnMotion,
-    Swing,
-    followed_swings,
-    largest_growth,
-    measured_swings,
-)
+from drillctrl.designs.controlled_swings import OnMotion, followed_swings
+from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.result import Analysis, Design, analysis_fields, assess
+from drillctrl.designs.swings import Swing, largest_growth, measured_swings
 from drillctrl.drilling.case import Case
 from drillctrl.motion.loop import torsional_system
 from drillctrl.simulation.controller import Controller

@@ -17,6 +17,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import si_scale
+from drillctrl.motion.crossings import sign_changes
 from drillctrl.motion.orbit import AxialOrbit, axial_orbit
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, BitResponse, bit_response
 from drillctrl.motion.torsion import TorsionalMode, ripple_of, torsional_modes
@@ -118,15 +119,11 @@ class ModeSwing:
     @property
     def crossings(self) -> tuple[Crossing, ...]:
         """Amplitudes at which it neither grows nor decays, those of no sure sign left out."""
-        sure = [each for each in self.at if each.sign]
-        found = []
-        for before, after in itertools.pairwise(sure):
-            if before.sign != after.sign:
-                low, high = before.amplitude, after.amplitude
-                a, b = before.root.real, after.root.real
-                kind = "swing" if before.sign > 0 else "kick"
-                found.append(Crossing(kind, low + (high - low) * a / (a - b), low, high))
-        return tuple(found)
+        found = sign_changes([each.amplitude for each in self.at], self.at)
+        return tuple(
+            Crossing("swing" if known.grows_below else "kick", known.place, known.low, known.high)
+            for known in found
+        )
 
 
 @dataclass(frozen=True, eq=False)

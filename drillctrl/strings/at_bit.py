@@ -32,10 +32,13 @@ class StringAtBit:
         The string.
     control : DriveControl or None
         Of its drive; None where the speed is imposed.
+    units : DrillString or None
+        Whose lumped equivalent makes the units of dimensionless points; None for its own.
     """
 
     string: DrillString
     control: DriveControl | None = None
+    units: DrillString | None = None
 
     def receptances(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return displacement per force, m/N, and rotation per torque, rad/(N m), (...).
@@ -69,8 +72,9 @@ class StringAtBit:
 
     @property
     def time_scale(self) -> float:
-        """Seconds to the unit of time of dimensionless points, √(I/Kt) of the lumped string."""
-        torsional = lumped(self.string, self.string.torsion)
+        """Seconds to the unit of time of dimensionless points, √(I/Kt) of a lumped string."""
+        unit = self.units or self.string
+        torsional = lumped(unit, unit.torsion)
         return float(np.sqrt(torsional.mass / torsional.stiffness))
 
     @functools.cached_property
@@ -98,10 +102,11 @@ def string_at_bit(plant: Plant) -> StringAtBit | None:
     if drives and not laws:
         wanted = "under a law that holds its speed, such as --structure soft-torque"
         raise InputError("top drive", "free to turn", wanted)
-    return _at_bit(plant.string.string, laws[0].control if laws else None)
+    hung = plant.string
+    return _at_bit(hung.string, laws[0].control if laws else None, hung.units)
 
 
 @functools.lru_cache(maxsize=64)
-def _at_bit(string: DrillString, control: DriveControl | None) -> StringAtBit:
+def _at_bit(string: DrillString, control: DriveControl | None, units: DrillString) -> StringAtBit:
     """Return the same object for equal strings, which keeps what it has counted."""
-    return StringAtBit(string, control)
+    return StringAtBit(string, control, units)

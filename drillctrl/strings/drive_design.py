@@ -25,7 +25,7 @@ from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import HIGHEST, drive_is_stable, lowest_impedance, mode_bands
 from drillctrl.synthesis.descent import bfgs
-from drillctrl.synthesis.search import spread_points
+from drillctrl.synthesis.spread import spread_points
 
 MODES = 4
 # Speed gains in units of ζ, torque gains as such; corners in units of the speed that scales s.

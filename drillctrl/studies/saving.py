@@ -21,8 +21,11 @@ from drillctrl.base.files import check_regular, write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure, Tie
 from drillctrl.delay.system import DelaySystem
-from drillctrl.designs import drilling, loop_analysis, mode_shift, trials, verdict, worst_case
+from drillctrl.designs import loop_analysis, mode_shift, trials, verdict, worst_case
+from drillctrl.designs.controlled_swings import ControlledSwing, OnMotion
+from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.result import Analysis, Design
+from drillctrl.designs.swings import Swing
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
@@ -54,8 +57,8 @@ _PARTS: tuple[type, ...] = (
     *(outcome.Figures, status.Outcome, status.Status),
     *(objectives.Exact, objectives.SemiDiscrete, objectives.Robust, objectives.HInfinity),
     *(objectives.Requirements, worst_case.WorstCase, certificate.OptimalityCertificate),
-    *(family.ActiveRoot, drilling.Drilling, drilling.Swing, drilling.ControlledSwing),
-    *(drilling.OnMotion, drill_string.DrillString, drill_string.Damping, section.Section),
+    *(family.ActiveRoot, Drilling, Swing, ControlledSwing, OnMotion),
+    *(drill_string.DrillString, drill_string.Damping, section.Section),
     *(section.Material, section.ToolJoint, drive_control.DriveMachine),
 )
 _CLASSES = {kind.__name__: kind for kind in _PARTS}

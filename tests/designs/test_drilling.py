@@ -27,15 +27,10 @@ from drillctrl import (
     torsional_system,
 )
 from drillctrl.designs.authority import Candidate, irregular
-from drillctrl.designs.drilling import (
-    Swing,
-    controlled_swings,
-    cost_of_gains,
-    measured_swings,
-    swing_families,
-)
+from drillctrl.designs.controlled_swings import controlled_swings
 from drillctrl.designs.motion_design import NONE_HELP
 from drillctrl.designs.quieter import quieter
+from drillctrl.designs.swings import Swing, cost_of_gains, measured_swings, swing_families
 from drillctrl.designs.trials import STARTS, Trial, trial_run
 from drillctrl.designs.verdict import Verdict, judge
 from drillctrl.motion.torsion import torsional_modes
