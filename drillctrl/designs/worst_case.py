@@ -11,6 +11,7 @@ from drillctrl.drilling.point import OperatingPoint
 from drillctrl.synthesis.objectives import WorstLoop
 
 _SAMPLED = (-1.0, 0.0, 1.0)
+_LARGEST = 0.9
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,29 @@ class WorstCase(WorstLoop):
 
     def __post_init__(self) -> None:
         for name in ("psi", "delta0", "omega0"):
-            checked_number(f"worst-case {name}", getattr(self, name), 0.0, 0.9)
+            checked_number(f"worst-case {name}", getattr(self, name), 0.0, _LARGEST)
 
     def around(self, point: OperatingPoint) -> tuple[OperatingPoint, ...]:
         """Return all points looked at, the given one first."""
         sizes = {name: getattr(self, name) for name in ("psi", "delta0", "omega0")}
         return (point, *box(point, sizes), *self.points)
+
+
+def fitted_box(errors: Mapping[str, float]) -> dict[str, float]:
+    """Return relative errors of the groups that those of a fitted string's numbers make.
+
+    Parameters
+    ----------
+    errors : mapping
+        Of ``stiffness`` and ``inertia``, relative: ψ follows I/Kt, δ0 1/Kt and ω0 √(I/Kt).
+    """
+    stiffness, inertia = errors.get("stiffness", 0.0), errors.get("inertia", 0.0)
+    sizes = {
+        "psi": stiffness + inertia,
+        "delta0": stiffness,
+        "omega0": 0.5 * (stiffness + inertia),
+    }
+    return {name: min(size, _LARGEST) for name, size in sizes.items()}
 
 
 def box(point: OperatingPoint, sizes: Mapping[str, float]) -> list[OperatingPoint]:
