@@ -102,6 +102,17 @@ from .motion.torsion import TorsionalMode as TorsionalMode
 from .motion.torsion import torsional_modes as torsional_modes
 from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
+from .records.downhole import Downhole as Downhole
+from .records.downhole import bit_from_surface as bit_from_surface
+from .records.fitted_rig import fitted_rig as fitted_rig
+from .records.fitted_rig import save_fit as save_fit
+from .records.fitting import Estimate as Estimate
+from .records.fitting import RecordFit as RecordFit
+from .records.fitting import fit_record as fit_record
+from .records.record import Record as Record
+from .records.record import read_record as read_record
+from .records.study import RecordStudy as RecordStudy
+from .records.study import study_record as study_record
 from .robustness.margins import delay_margin as delay_margin
 from .robustness.margins import parameter_margin as parameter_margin
 from .robustness.norm import PeakGain as PeakGain

@@ -72,6 +72,7 @@ BASES = {
     ("bit",): RIG,
     ("compare",): ("--structures", "p", "--no-charts", "--trials", "none"),
     ("map",): ("--starts", "kick"),
+    ("record",): ("example",),
     ("reproduce",): ("fig8",),
 }
 # What takes seconds of work once all is read is not done.
@@ -81,6 +82,7 @@ WORK = (
     "studies.compare.compare",
     "studies.vibration.vibration_map",
     "paper.reproduce.reproduce",
+    "records.study.study_record",
 )
 
 

@@ -234,6 +234,21 @@ def _split(text: str, dimension: Dimension) -> tuple[str, str]:
     return (match[1], match[2]) if match else ("", "")
 
 
+def known_unit(text: str) -> bool:
+    """Return whether a text is a unit of something, as rigs and pint spell it."""
+    import pint
+
+    if not text or len(text) > 40 or not re.fullmatch(_UNIT, text):
+        return False
+    for unit in (*_readings(text, NUMBER), *_readings(text, ROTARY_SPEED)):
+        try:
+            _registry().Quantity(1.0, unit)
+        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+            continue
+        return True
+    return text in _TWO_READINGS
+
+
 def from_si(value: float, dimension: Dimension, unit: str) -> float:
     """Convert an SI number to another unit, for display.
 

@@ -84,6 +84,22 @@ def read_requirements(options: dict[str, Any]) -> Requirements:
     )
 
 
+def _of_fit(rig: str | None) -> dict[str, float]:
+    """Return the errors that a rig fitted to a recording has; none of any other."""
+    if rig is None:
+        return {}
+    from drillctrl.designs.worst_case import fitted_box
+    from drillctrl.strings.files import fitted_errors
+
+    errors = fitted_errors(rig)
+    if not errors:
+        return {}
+    sizes = fitted_box(errors)
+    told = ", ".join(f"{name} by {100.0 * size:.1f} %" for name, size in sizes.items())
+    click.echo(f"drillctrl: note: the box is that of the fitted rig: {told}", err=True)
+    return {option: sizes[name] for option, name in _ERRORS.items()}
+
+
 def read_objective(options: dict[str, Any]) -> Objective | None:
     """Take the options of `objective_options` out of a mapping; None where none was chosen.
 
@@ -104,6 +120,8 @@ def read_objective(options: dict[str, Any]) -> Objective | None:
         "robust": Robust,
     }
     name = options.pop("objective")
+    if name == "worst-case" and all(options[option] is None for option in _ERRORS):
+        options.update(_of_fit(options.get("rig")))
     if name is not None and name not in kinds:
         raise InputError("--objective", name, f"one of {', '.join(kinds)}")
     known = {option for names in _BELONGS.values() for option in names}

@@ -15,6 +15,7 @@ from drillctrl.synthesis.objectives import WorstLoop
 
 _SAMPLED = (-1.0, 0.0, 1.0)
 _POINT, _STRING = ("psi", "delta0", "omega0"), ("depth", "mud")
+_LARGEST = 0.9
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class WorstCase(WorstLoop):
 
     def __post_init__(self) -> None:
         for name in (*_POINT, *_STRING):
-            checked_number(f"worst-case {name}", getattr(self, name), 0.0, 0.9)
+            checked_number(f"worst-case {name}", getattr(self, name), 0.0, _LARGEST)
 
     def around(self, case: Case) -> tuple[Case, ...]:
         """Return all cases looked at, the given one first."""
@@ -92,7 +93,25 @@ def _restrung(case: Case, name: str, error: float) -> Case:
     return Case(restrung(plant, **{name: own * (1.0 + error)}), point)
 
 
+def fitted_box(errors: Mapping[str, float]) -> dict[str, float]:
+    """Return relative errors of the groups that those of a fitted string's numbers make.
+
+    Parameters
+    ----------
+    errors : mapping
+        Of ``stiffness`` and ``inertia``, relative: ψ follows I/Kt, δ0 1/Kt and ω0 √(I/Kt).
+    """
+    stiffness, inertia = errors.get("stiffness", 0.0), errors.get("inertia", 0.0)
+    sizes = {
+        "psi": stiffness + inertia,
+        "delta0": stiffness,
+        "omega0": 0.5 * (stiffness + inertia),
+    }
+    return {name: min(size, _LARGEST) for name, size in sizes.items()}
+
+
 def _box(point: OperatingPoint, sizes: Mapping[str, float]) -> list[OperatingPoint]:
+    """Return corners, middles of edges and of faces of a box of relative sizes about a point."""
     moved = {name: size for name, size in sizes.items() if size > 0.0}
     return [
         point.with_changes(

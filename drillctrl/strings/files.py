@@ -25,6 +25,8 @@ from drillctrl.strings.presets import string_preset
 from drillctrl.strings.rig import StringRig, string_rig
 from drillctrl.strings.section import KINDS, MATERIALS, Section, ToolJoint
 
+# What a fit to a recording knows of its rig, beside the rig itself.
+FIT = "fit"
 # No hole is wider.
 _WIDEST = 1.0
 _MOST_BYTES = 10_000_000
@@ -116,9 +118,36 @@ def load_rig(source: str | Path) -> Rig:
     if str(source) in LUMPED_PRESETS:
         return table1()
     data = read_toml(source, f"one of the presets {', '.join(presets)} or a readable TOML file")
+    data.pop(FIT, None)
     if "sections" not in data and not {"bit", "rock"} & set(data):
         return rig_from_mapping(data, str(source))
     return _string_rig(data, Path(source))
+
+
+def fitted_errors(source: str | Path) -> dict[str, float]:
+    """Return relative errors of a rig that was fitted to a recording, by name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A preset or a file as of `load_rig`; what holds no ``[fit]`` has none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or an error is no number in [0, 0.9].
+    """
+    if str(source) in (*LUMPED_PRESETS, *STRING_PRESETS):
+        return {}
+    known = read_toml(source, "a readable TOML file").get(FIT, {})
+    rows = known.get("uncertainty", {}) if isinstance(known, dict) else {}
+    found = {}
+    for name in ("stiffness", "inertia"):
+        row = rows.get(name) if isinstance(rows, dict) else None
+        if isinstance(row, dict) and "error" in row:
+            where = f"fit.uncertainty.{name}.error in {source}"
+            found[name] = checked_number(where, row["error"], 0.0, 0.9)
+    return found
 
 
 def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
