@@ -73,6 +73,7 @@ BASES = {
     ("compare",): ("--structures", "p", "--no-charts", "--trials", "none"),
     ("map",): ("--starts", "kick"),
     ("reproduce",): ("fig8",),
+    ("explore",): ("--no-browser",),
 }
 # What takes seconds of work once all is read is not done.
 WORK = (
@@ -81,6 +82,7 @@ WORK = (
     "studies.compare.compare",
     "studies.vibration.vibration_map",
     "paper.reproduce.reproduce",
+    "explorer.server.serve",
 )
 
 
