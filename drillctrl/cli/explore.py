@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.errors import checked_integer
 from drillctrl.base.extras import required
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.verb import Verb
@@ -38,8 +38,6 @@ def explore_command(port: int, no_browser: bool, **point: Any) -> None:
       drillctrl explore --rig table1 --speed "120 rpm" --rop "20 m/h"
     """
     checked_integer("port", port, 0, 65535)
-    if point["wob"] is not None:
-        raise InputError("--wob", point["wob"], "--rop here: that is what the page moves")
     where = read_point(point)
     required("tornado", "explore")
     from drillctrl.explorer.server import bound, serve

@@ -141,6 +141,9 @@ def _work(connection: multiprocessing.connection.Connection) -> None:
     follow_parent()
     from drillctrl.explorer.answers import answer
 
-    while True:
-        question = connection.recv()
-        connection.send(("answer", answer(question, lambda *told: connection.send(("told", told)))))
+    # Whoever started this process ends it; where that went away first, nobody is left to tell.
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        while True:
+            question = connection.recv()
+            found = answer(question, lambda *told: connection.send(("told", told)))
+            connection.send(("answer", found))

@@ -25,7 +25,7 @@ from drillctrl.studies.vibration import vibration_map
 _SAMPLES = 1500
 # Seconds of wall time after which a motion that follows the hand is broken off.
 PATIENCE = 5.0
-_MOST_NODES = 40
+_FEW_NODES, _MOST_NODES = 9, 40
 # Columns of a motion, in units of the field: SI factor and unit.
 _SHOWN = {
     "bit_speed": (30.0 / np.pi, "rpm"),
@@ -118,7 +118,8 @@ def vibrations(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     across, up = (checked_integer("points", count, 2, _MOST_NODES) for count in counts)
     case, controller = asked.run()
     tell(0, 0, "starting")
-    with open_executor(_cores(), None) as executor:
+    # Processes of their own would take longer to start than a few points.
+    with open_executor(_cores() if across * up > _FEW_NODES else 1, None) as executor:
         found = vibration_map(
             case,
             x,

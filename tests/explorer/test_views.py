@@ -25,7 +25,6 @@ from drillctrl import (
     vibration_map,
 )
 from drillctrl.designs.design import analyze
-from drillctrl.explorer import runs
 from drillctrl.explorer.answers import answer
 from drillctrl.explorer.rig_text import complaints, rig_as_text, rig_from_text
 from drillctrl.spectrum import characteristic
@@ -165,8 +164,7 @@ def test_what_follows_the_hand_is_the_same_motion_in_short():
     assert short["data"] is None
 
 
-def test_a_map_is_that_of_vibration_map(monkeypatch, capsys):
-    monkeypatch.setattr(runs, "_cores", lambda: 1)
+def test_a_map_is_that_of_vibration_map():
     found, told = ask("map", FREE, x=[80, 160], y=[10, 30], counts=[2, 2])
     own = vibration_map(POINT, ("speed", 80, 160), ("rop", 10, 30), counts=(2, 2), refine=0)
     assert found["outcomes"] == own.uncontrolled.outcomes.tolist()
