@@ -74,6 +74,7 @@ BASES = {
     ("map",): ("--starts", "kick"),
     ("record",): ("example",),
     ("reproduce",): ("fig8",),
+    ("explore",): ("--no-browser",),
 }
 # What takes seconds of work once all is read is not done.
 WORK = (
@@ -83,6 +84,7 @@ WORK = (
     "studies.vibration.vibration_map",
     "paper.reproduce.reproduce",
     "records.study.study_record",
+    "explorer.server.serve",
 )
 
 

@@ -10,7 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
-    *("motion", "designs", "charts", "tables", "studies", "records", "paper", "interop", "cli"),
+    *("motion", "designs", "charts", "tables", "studies", "records", "paper", "interop"),
+    *("explorer", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (

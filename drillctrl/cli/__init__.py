@@ -16,6 +16,7 @@ from drillctrl.cli.bit import bit_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
+from drillctrl.cli.explore import explore_command
 from drillctrl.cli.map import map_command
 from drillctrl.cli.record import record_command
 from drillctrl.cli.reproduce import reproduce_command
@@ -48,6 +49,7 @@ for _command in (
     record_command,
     reproduce_command,
     rig_command,
+    explore_command,
 ):
     cli.add_command(_command)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
@@ -117,6 +117,7 @@ def simulate(
     max_steps: int = 1_000_000,
     time_limit: float = math.inf,
     other_plant: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Simulation:
     """Simulate the drill string with state-dependent delay, dry friction and loss of contact.
 
@@ -155,6 +156,8 @@ def simulate(
         several times a second.
     other_plant : bool
         Whether the plant may be another than the one that the controller names.
+    progress : callable, optional
+        Called with the time that was reached, several times a second.
 
     Returns
     -------
@@ -235,6 +238,8 @@ def simulate(
             outcome = march.march(*standing[:-1], duration, float(max_step), tries)
             used = int(standing.ints[march.STEPS])
             if outcome == data.PAUSED:
+                if progress is not None:
+                    progress(float(standing.reals[march.TIME]))
                 if time.perf_counter() - started <= time_limit:
                     continue
                 break

@@ -27,6 +27,7 @@ from drillctrl.strings.section import KINDS, MATERIALS, Section, ToolJoint
 
 # What a fit to a recording knows of its rig, beside the rig itself.
 FIT = "fit"
+PRESETS = (*LUMPED_PRESETS, *STRING_PRESETS)
 # No hole is wider.
 _WIDEST = 1.0
 _MOST_BYTES = 10_000_000
@@ -112,16 +113,35 @@ def load_rig(source: str | Path) -> Rig:
         If there is no such preset or file, or the file is not TOML, lacks a key, has one too
         many, or holds a value outside its range.
     """
-    presets = (*LUMPED_PRESETS, *STRING_PRESETS)
     if str(source) in STRING_PRESETS:
         return string_preset(str(source))
     if str(source) in LUMPED_PRESETS:
         return table1()
-    data = read_toml(source, f"one of the presets {', '.join(presets)} or a readable TOML file")
-    data.pop(FIT, None)
+    data = read_toml(source, f"one of the presets {', '.join(PRESETS)} or a readable TOML file")
+    return rig_from_data(data, str(source), Path(source).parent)
+
+
+def rig_from_data(data: dict[str, Any], path: str, folder: Path | None = None) -> Rig:
+    """Return the rig of a file that was read.
+
+    Parameters
+    ----------
+    data : dict
+        What TOML holds.
+    path : str
+        What the file is called in messages.
+    folder : Path, optional
+        Where a tally may lie; without it no other file is read.
+
+    Raises
+    ------
+    InputError
+        As `load_rig`.
+    """
+    data = {key: value for key, value in data.items() if key != FIT}
     if "sections" not in data and not {"bit", "rock"} & set(data):
-        return rig_from_mapping(data, str(source))
-    return _string_rig(data, Path(source))
+        return rig_from_mapping(data, path)
+    return _string_rig(data, path, folder)
 
 
 def fitted_errors(source: str | Path) -> dict[str, float]:
@@ -137,7 +157,7 @@ def fitted_errors(source: str | Path) -> dict[str, float]:
     InputError
         If the file cannot be read, or an error is no number in [0, 0.9].
     """
-    if str(source) in (*LUMPED_PRESETS, *STRING_PRESETS):
+    if str(source) in PRESETS:
         return {}
     known = read_toml(source, "a readable TOML file").get(FIT, {})
     rows = known.get("uncertainty", {}) if isinstance(known, dict) else {}
@@ -150,8 +170,8 @@ def fitted_errors(source: str | Path) -> dict[str, float]:
     return found
 
 
-def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
-    _check_keys(data, ("sections", *PARTS), str(path), _OPTIONAL_PARTS)
+def _string_rig(data: Mapping[str, Any], path: str, folder: Path | None) -> StringRig:
+    _check_keys(data, ("sections", *PARTS), path, _OPTIONAL_PARTS)
     found: dict[str, dict[str, Any]] = {}
     for part, known in PARTS.items():
         given = data.get(part, {})
@@ -178,12 +198,12 @@ def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
         if key in given
     })  # fmt: skip
     mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
-    string = DrillString(_sections(data["sections"], path), damping, mud, ropes)
+    string = DrillString(_sections(data["sections"], path, folder), damping, mud, ropes)
     typed = {key: (f"{part}.{key}", value) for part in ("bit", "rock", "top_drive")
              for key, value in data.get(part, {}).items()}  # fmt: skip
     for parameter, key in _CALLED.items():
         typed[parameter] = typed.pop(key, (key, None))
-    with blamed_on(str(path), typed):
+    with blamed_on(path, typed):
         return string_rig(
             string,
             drive=DriveMachine(**drive) if drive else None,
@@ -209,11 +229,11 @@ def _check_keys(
         raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
 
 
-def _sections(given: Any, path: Path) -> tuple[Section, ...]:
-    if isinstance(given, str):
-        return read_tally(path.parent / given)
+def _sections(given: Any, path: str, folder: Path | None) -> tuple[Section, ...]:
+    if isinstance(given, str) and folder is not None:
+        return read_tally(folder / given)
     if not isinstance(given, list) or not given or not all(isinstance(r, dict) for r in given):
-        wanted = "tables, [[sections]], or the name of a CSV file"
+        wanted = "tables, [[sections]]" + (", or the name of a CSV file" if folder else "")
         raise InputError(f"sections in {path}", given, wanted)
     found = []
     for i, row in enumerate(given, 1):
