@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
-    *("motion", "designs", "charts", "tables", "studies", "paper", "interop", "cli"),
+    *("motion", "designs", "charts", "tables", "hardware", "studies", "paper", "interop", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (
