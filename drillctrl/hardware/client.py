@@ -82,9 +82,10 @@ def table_law(table: GainTable, period: float, limit: float, **options: object) 
         ("omega0", "delta0", "psi"),
         ("rotary_speed", "penetration_rate", "rock_strength"),
     )
-    if table.grid.names not in told:
+    names = tuple(axis.name for axis in table.grid.axes)
+    if names not in told:
         wanted = f"over {', '.join(told[table.grid.rig is not None])}, which the bench tells"
-        raise InputError("table", f"over {', '.join(table.grid.names)}", wanted)
+        raise InputError("table", f"over {', '.join(names)}", wanted)
     given = Options(**options)  # type: ignore[typeddict-item]
     controller = sampled_controller(table, "bench", period, limit, given)
     steps = SteppedController(controller, len(table.structure.outputs))
