@@ -73,6 +73,13 @@ from .drilling.string import spring_string as spring_string
 from .drilling.structures import feed as feed
 from .drilling.structures import preset_structure as preset_structure
 from .drilling.structures import soft_torque as soft_torque
+from .hardware.bench import bench as bench
+from .hardware.bench import replay as replay
+from .hardware.client import answer_bench as answer_bench
+from .hardware.recording import Recording as Recording
+from .hardware.recording import load_recording as load_recording
+from .hardware.result import BenchRun as BenchRun
+from .hardware.wire import Sample as Sample
 from .interop.controllers import controller_system as controller_system
 from .interop.controllers import scheduled_controller as scheduled_controller
 from .interop.lifted import lifted_system as lifted_system
@@ -140,6 +147,7 @@ from .simulation.slowing import slow_down as slow_down
 from .simulation.starts import StartRun as StartRun
 from .simulation.starts import StartSet as StartSet
 from .simulation.starts import simulate_starts as simulate_starts
+from .simulation.stepping import SteppedRun as SteppedRun
 from .spectrum.count import count_right_of as count_right_of
 from .spectrum.multiplicity import Root as Root
 from .spectrum.proof import prove_count as prove_count

@@ -10,8 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
-    *("motion", "designs", "charts", "tables", "studies", "records", "paper", "interop"),
-    *("explorer", "cli"),
+    *("motion", "designs", "charts", "tables", "hardware", "studies", "records", "paper"),
+    *("interop", "explorer", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+import tokenize
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,9 @@ from drillctrl.base.errors import InputError, checked_number
 
 if TYPE_CHECKING:
     import pint
+
+# What pint lets through of those that its parser meets.
+_REFUSED = (AssertionError, AttributeError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -184,7 +188,7 @@ def to_si(parameter: str, value: object, dimension: Dimension) -> float:
         try:
             si = _converted(float(number), unit, dimension)
             break
-        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+        except (pint.PintError, tokenize.TokenError, *_REFUSED):
             continue
     if si is None:
         raise InputError(parameter, repr(value), permitted)

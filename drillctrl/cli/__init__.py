@@ -12,6 +12,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.analyze import analyze_command
+from drillctrl.cli.bench import bench_command
 from drillctrl.cli.bit import bit_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
@@ -47,6 +48,7 @@ for _command in (
     bit_command,
     table_command,
     record_command,
+    bench_command,
     reproduce_command,
     rig_command,
     explore_command,

@@ -9,11 +9,14 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
+from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_law import LAW, asking_plant
+from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig
 
 _NONE = np.zeros((1, 2))
@@ -133,6 +136,42 @@ def law_controller(
         actuator_lag=machine.lag / time,
         period=None if period is None else period / time,
     )
+
+
+@checks_kinds
+def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[str, float]]:
+    """Return the plant whose top drive takes any torque, and what surrounds a law of it.
+
+    Parameters
+    ----------
+    where : RigPoint
+        A string under a top drive with inertia, and where it drills.
+    bit : BitRock, optional
+        The bit–rock law, the paper's without it.
+
+    Returns
+    -------
+    Case, dict
+        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay and actuator_lag of
+        its machine as `Controller` takes them.
+
+    Raises
+    ------
+    InputError
+        If the rig has no such drive, or it has less torque than steady drilling takes.
+    """
+    rig = where.rig
+    if not isinstance(rig, StringRig) or rig.drive is None:
+        raise InputError("rig", type(rig).__name__, "one with a string and a top drive")
+    machine = rig.drive
+    drive = TopDrive(inertia_ratio=machine.inertia / rig.inertia)
+    case = as_case(where, paper_plant(bit, PipeString(rig.string), blocks=(drive,)))
+    limit = _spare_torque(case, machine, rig.torsional_stiffness)
+    around = {
+        "measurement_delay": machine.delay / rig.time_scale,
+        "actuator_lag": machine.lag / rig.time_scale,
+    }
+    return case, around if limit is None else {**around, "limit": limit}
 
 
 def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:
