@@ -72,6 +72,7 @@ BASES = {
     ("bit",): RIG,
     ("compare",): ("--structures", "p", "--no-charts", "--trials", "none"),
     ("map",): ("--starts", "kick"),
+    ("report",): (*RIG, "--out", "report.html"),
     ("reproduce",): ("fig8",),
 }
 # What takes seconds of work once all is read is not done.

@@ -17,6 +17,7 @@ from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
 from drillctrl.cli.map import map_command
+from drillctrl.cli.report import report_command
 from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.rig import rig_command
 from drillctrl.cli.simulate import simulate_command
@@ -44,6 +45,7 @@ for _command in (
     simulate_command,
     bit_command,
     table_command,
+    report_command,
     reproduce_command,
     rig_command,
 ):
