@@ -213,6 +213,8 @@ from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
+from .studies.rig_report import RigReport as RigReport
+from .studies.rig_report import rig_report as rig_report
 from .studies.saving import load_result as load_result
 from .studies.saving import save_result as save_result
 from .studies.vibration import VibrationMap as VibrationMap

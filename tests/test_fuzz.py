@@ -73,6 +73,7 @@ BASES = {
     ("compare",): ("--structures", "p", "--no-charts", "--trials", "none"),
     ("map",): ("--starts", "kick"),
     ("record",): ("example",),
+    ("report",): (*RIG, "--out", "report.html"),
     ("reproduce",): ("fig8",),
     ("explore",): ("--no-browser",),
     ("bench",): ("--duration", "0.1", "--wait", "0.05 s", "--port", "0"),

@@ -20,6 +20,7 @@ from drillctrl.cli.design import design_command
 from drillctrl.cli.explore import explore_command
 from drillctrl.cli.map import map_command
 from drillctrl.cli.record import record_command
+from drillctrl.cli.report import report_command
 from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.rig import rig_command
 from drillctrl.cli.simulate import simulate_command
@@ -49,6 +50,7 @@ for _command in (
     table_command,
     record_command,
     bench_command,
+    report_command,
     reproduce_command,
     rig_command,
     explore_command,
