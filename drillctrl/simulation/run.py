@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from types import ModuleType
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, resized, settings_for
+from drillctrl.simulation.layout import FIRST_ROOM, March, begin, check_start, resized, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.status import Status
@@ -22,6 +23,8 @@ CUTTINGS = ("multiple", "single")
 BACKWARDS = ("rest", "stop")
 LONGEST = 1e6
 TRIES = 400_000
+# Times the room that is used up.
+_MOST_ROOM = 32.0
 
 
 class Interrupted(KeyboardInterrupt):
@@ -96,7 +99,20 @@ def checked_run(
     check_start(point, structure, scenario, linear)
     if controller is not None:
         controller.gains(structure.input_names, structure.output_names)
+        for name in controller.back_calculation:
+            if name not in structure.state_names:
+                raise InputError("back_calculation", name, "a state of the plant")
     return scenario, duration, rtol, atol, max_steps
+
+
+def _room(standing: March, march: ModuleType, duration: float) -> int:
+    """Return for how many steps there is to be room where it is used up.
+
+    As many as the rest takes if it goes on as until now; what is not written to takes no memory.
+    """
+    used, reached = int(standing.ints[march.STEPS]), float(standing.reals[march.TIME])
+    foreseen = 1.1 * used * duration / max(reached, 1e-9)
+    return int(min(max(2.0 * used, foreseen), _MOST_ROOM * used))
 
 
 def simulate(
@@ -238,7 +254,7 @@ def simulate(
                 break
             if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
                 break
-            room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
+            room = min(_room(standing, march, duration), max_steps + 1 + standing.first)
             standing = standing._replace(history=resized(standing.history, room, used))
     except KeyboardInterrupt:
         # Heard between two calls of the march, which leave all in place.
