@@ -225,7 +225,7 @@ def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = No
     """
     machine, time = control.machine, rig.time_scale
     ratio = machine.inertia / rig.inertia
-    blocks: list[Block] = [TopDrive(inertia_ratio=ratio)]
+    blocks: list[Block] = [*rig.hoist(), TopDrive(inertia_ratio=ratio)]
     if machine.lag:
         blocks.append(Lagging("drive", machine.lag / time))
     if machine.delay:
@@ -245,7 +245,7 @@ def asking_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = No
     machine, time = control.machine, rig.time_scale
     ratio = machine.inertia / rig.inertia
     measured = replace(control, machine=replace(machine, lag=0.0, delay=0.0))
-    blocks: list[Block] = [TopDrive(inertia_ratio=ratio)]
+    blocks: list[Block] = [*rig.hoist(), TopDrive(inertia_ratio=ratio)]
     if machine.encoder:
         blocks += [Filtered(name, machine.encoder / time) for name in ("phi", "dphi")]
     blocks.append(DriveLaw(measured, time, rig.torsional_stiffness, ratio, acts=False))
