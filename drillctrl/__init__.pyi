@@ -53,6 +53,7 @@ from .drilling.coefficients import Coefficients as Coefficients
 from .drilling.drive import TopDrive as TopDrive
 from .drilling.friction import FreeBit as FreeBit
 from .drilling.friction import Stribeck as Stribeck
+from .drilling.hoist import Hoist as Hoist
 from .drilling.plant import Plant as Plant
 from .drilling.plant import paper_plant as paper_plant
 from .drilling.plant import top_drive_plant as top_drive_plant
@@ -196,6 +197,7 @@ from .strings.named_roots import NamedRoots as NamedRoots
 from .strings.named_roots import named_roots as named_roots
 from .strings.presets import string_preset as string_preset
 from .strings.rig import StringRig as StringRig
+from .strings.rig import WeightControl as WeightControl
 from .strings.rig import lump as lump
 from .strings.rig import string_rig as string_rig
 from .strings.saving import save_rig as save_rig

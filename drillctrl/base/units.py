@@ -67,6 +67,7 @@ NUMBER = Dimension("a plain number", "", "'0.6'")
 DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
 LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")
 RATE = Dimension("a rate", "1/s", "'0.1 1/s'")
+FEED_GAIN = Dimension("a feed per force", "m/s/N", "'0.2 m/h/kN'")
 TIME = Dimension("a time", "s", "'0.35 s' or '20 ms'")
 
 # The field's spellings that pint lacks or reads as something else (kNm: nautical miles).

@@ -28,7 +28,11 @@ SURROUNDING_OPTIONS = (
     click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
     click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
     click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
-    click.option("--limit", metavar="TORQUE", help="Largest |u|: 3, or '5 kN*m' with a rig."),
+    click.option(
+        "--limit",
+        metavar="TORQUE",
+        help="Largest |u|: 3, or '5 kN*m' with a rig; a drive's integral does not wind up there.",
+    ),
     click.option("--rate-limit", metavar="RATE", help="Fastest change of u: 5, or '50 kN*m/s'."),
 )
 

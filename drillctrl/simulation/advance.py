@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 from drillctrl.simulation.compile import kernel
@@ -15,6 +16,8 @@ from drillctrl.simulation.status import Status
 from drillctrl.simulation.structure import Structure
 
 TRIES = 400_000
+# Times the room that is used up.
+_MOST_ROOM = 32.0
 
 
 def go_on(
@@ -65,12 +68,22 @@ def go_on(
                 break
             if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
                 break
-            room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
+            room = min(_room(standing, march, end), max_steps + 1 + standing.first)
             standing = standing._replace(history=resized(standing.history, room, used))
     except KeyboardInterrupt:
         # Heard between two calls of the march, which leave all in place.
         outcome = data.INTERRUPTED
     return standing, outcome
+
+
+def _room(standing: March, march: ModuleType, duration: float) -> int:
+    """Return for how many steps there is to be room where it is used up.
+
+    As many as the rest takes if it goes on as until now; what is not written to takes no memory.
+    """
+    used, reached = int(standing.ints[march.STEPS]), float(standing.reals[march.TIME])
+    foreseen = 1.1 * used * duration / max(reached, 1e-9)
+    return int(min(max(2.0 * used, foreseen), _MOST_ROOM * used))
 
 
 def finished(standing: March, outcome: int, **asked: Any) -> Simulation:

@@ -95,6 +95,9 @@ def checked_run(
     check_start(point, structure, scenario, linear)
     if controller is not None:
         controller.gains(structure.input_names, structure.output_names)
+        for name in controller.back_calculation:
+            if name not in structure.state_names:
+                raise InputError("back_calculation", name, "a state of the plant")
     return scenario, duration, rtol, atol, max_steps
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.hoist import Hoist
 from drillctrl.drilling.plant import Plant
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveControl
@@ -87,8 +88,13 @@ def _not_zero(s: ComplexArray) -> ComplexArray:
     return np.asarray(np.where(s == 0.0, _NEARLY_NOTHING, s))
 
 
+def fed_by_weight(plant: Plant) -> bool:
+    """Whether the upper end hangs on a hook of its own, of which the exact string knows nothing."""
+    return any(isinstance(block, Hoist) for block in plant.blocks)
+
+
 def string_at_bit(plant: Plant) -> StringAtBit | None:
-    """Return the exact string of a plant; None if the plant is not a bit on a string of pipe.
+    """Return the exact string of a plant; None if the plant is none of pipe under imposed feed.
 
     Raises
     ------
@@ -102,6 +108,8 @@ def string_at_bit(plant: Plant) -> StringAtBit | None:
     if drives and not laws:
         wanted = "under a law that holds its speed, such as --structure soft-torque"
         raise InputError("top drive", "free to turn", wanted)
+    if fed_by_weight(plant):
+        return None
     hung = plant.string
     return _at_bit(hung.string, laws[0].control if laws else None, hung.units)
 

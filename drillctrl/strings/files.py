@@ -22,7 +22,7 @@ from drillctrl.strings.drill_string import Damping, DrillString
 from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.presets import PRESETS as STRING_PRESETS
 from drillctrl.strings.presets import string_preset
-from drillctrl.strings.rig import StringRig, string_rig
+from drillctrl.strings.rig import StringRig, WeightControl, string_rig
 from drillctrl.strings.section import KINDS, MATERIALS, Section, ToolJoint
 
 # What a fit to a recording knows of its rig, beside the rig itself.
@@ -55,13 +55,18 @@ PARTS: dict[str, dict[str, Dimension | None]] = {
     },
     "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
     "mud": {"density": units.DENSITY},
-    "hoisting": {"stiffness": units.STIFFNESS},
+    "hoisting": {
+        "stiffness": units.STIFFNESS,
+        "block_mass": units.MASS,
+        "feed_gain": units.FEED_GAIN,
+    },
 }
 # What may be left out: whole tables, and keys of tables.
 _OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
 _OPTIONAL = (
     *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
     *("torsional", "axial", "kelvin_voigt"),
+    *("stiffness", "block_mass", "feed_gain"),
 )
 # Attributes of a rig, and what they are called in a file.
 _CALLED = {"bit_radius": "diameter", "bit_geometry": "geometry", "rock_strength": "strength"}
@@ -197,22 +202,41 @@ def _string_rig(data: Mapping[str, Any], path: str, folder: Path | None) -> Stri
                           ("retardation", "kelvin_voigt"))
         if key in given
     })  # fmt: skip
-    mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
+    mud, hoisting = found["mud"].get("density", 0.0), found["hoisting"]
+    control = _weight_control(hoisting, data.get("hoisting", {}), path)
+    ropes = hoisting.get("stiffness")
     string = DrillString(_sections(data["sections"], path, folder), damping, mud, ropes)
     typed = {key: (f"{part}.{key}", value) for part in ("bit", "rock", "top_drive")
              for key, value in data.get(part, {}).items()}  # fmt: skip
+    typed["hoisting stiffness"] = "hoisting.stiffness", data.get("hoisting", {}).get("stiffness")
     for parameter, key in _CALLED.items():
         typed[parameter] = typed.pop(key, (key, None))
     with blamed_on(path, typed):
         return string_rig(
             string,
             drive=DriveMachine(**drive) if drive else None,
+            weight_control=control,
             bit_radius=0.5 * diameter,
             bit_geometry=bit.pop("geometry"),
             rock_strength=rock["strength"],
             contact_strength=rock["contact_strength"],
             **bit,
         )
+
+
+def _weight_control(
+    hoisting: Mapping[str, Any], written: Mapping[str, Any], path: str
+) -> WeightControl | None:
+    """Return what feeds a string by its weight, if anything does."""
+    names = ("block_mass", "feed_gain")
+    missing = [name for name in names if name not in hoisting]
+    if len(missing) == len(names):
+        return None
+    if missing:
+        raise InputError(f"{missing[0]} in [hoisting] of {path}", "(missing)", "given")
+    typed = {name.replace("_", " "): (f"hoisting.{name}", written[name]) for name in names}
+    with blamed_on(path, typed):
+        return WeightControl(**{name: hoisting[name] for name in names})
 
 
 def _check_keys(

@@ -13,7 +13,6 @@ from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.units import Dimension
 from drillctrl.drilling.rig import Rig, rig_mapping
-from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.files import COLUMNS, PARTS
 from drillctrl.strings.rig import StringRig
@@ -73,7 +72,7 @@ def _string_rig(rig: StringRig) -> dict[str, Any]:
             "kelvin_voigt": damping.retardation,
         },
         "mud": {"density": string.mud_density} if string.mud_density else {},
-        "hoisting": _hoisting(string),
+        "hoisting": _hoisting(rig),
     }
     parts = {name: _texts(part, PARTS[name]) for name, part in values.items() if part}
     return {**parts, "sections": [_texts(_section(one), COLUMNS) for one in string.sections]}
@@ -86,8 +85,10 @@ def _drive(machine: DriveMachine | None) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _hoisting(string: DrillString) -> dict[str, Any]:
-    ropes = string.hoisting_stiffness
+def _hoisting(rig: StringRig) -> dict[str, Any]:
+    control, ropes = rig.weight_control, rig.string.hoisting_stiffness
+    if control is not None:
+        return {"block_mass": control.block_mass, "feed_gain": control.feed_gain}
     return {} if ropes is None else {"stiffness": ropes}
 
 

@@ -38,7 +38,7 @@ from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.spectrum.multiplicity import Root
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.strings import drill_string, drive_control, section
-from drillctrl.strings.rig import StringRig
+from drillctrl.strings.rig import StringRig, WeightControl
 from drillctrl.studies.campaign import Campaign
 from drillctrl.studies.trial import OUTCOMES
 from drillctrl.synthesis import certificate, family, objectives
@@ -59,7 +59,7 @@ _PARTS: tuple[type, ...] = (
     *(objectives.Requirements, worst_case.WorstCase, certificate.OptimalityCertificate),
     *(family.ActiveRoot, Drilling, Swing, ControlledSwing, OnMotion),
     *(drill_string.DrillString, drill_string.Damping, section.Section),
-    *(section.Material, section.ToolJoint, drive_control.DriveMachine),
+    *(section.Material, section.ToolJoint, drive_control.DriveMachine, WeightControl),
 )
 _CLASSES = {kind.__name__: kind for kind in _PARTS}
 

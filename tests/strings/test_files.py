@@ -1,5 +1,7 @@
 """Rig files that hold a string, and what they are refused for."""
 
+import dataclasses
+
 import pytest
 
 from drillctrl import (
@@ -12,6 +14,7 @@ from drillctrl import (
     save_rig,
     string_preset,
 )
+from drillctrl.strings.rig import WeightControl
 
 BIT = """
 [bit]
@@ -162,8 +165,10 @@ def test_a_wrong_tally_is_refused(tmp_path, text, message):
 @pytest.mark.parametrize("name", ["paper-string", "vertical-3000", "deep-5000"])
 def test_a_saved_string_loads_as_it_was(tmp_path, name):
     for rig in (string_preset(name), changed_rig(string_preset(name), depth=2345.6789, mud=1357.9)):
-        save_rig(rig, tmp_path / "rig.toml")
-        assert load_rig(tmp_path / "rig.toml") == rig
+        fed = dataclasses.replace(rig, weight_control=WeightControl(30e3, 1e-7))
+        for each in (rig, fed):
+            save_rig(each, tmp_path / "rig.toml")
+            assert load_rig(tmp_path / "rig.toml") == each
 
 
 def test_a_file_of_ones_own_begins_as_a_preset(tmp_path, capsys):
