@@ -105,6 +105,7 @@ from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
 from .records.downhole import Downhole as Downhole
 from .records.downhole import bit_from_surface as bit_from_surface
+from .records.example import example_path as example_path
 from .records.fitted_rig import fitted_rig as fitted_rig
 from .records.fitted_rig import save_fit as save_fit
 from .records.fitting import Estimate as Estimate

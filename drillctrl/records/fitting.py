@@ -19,6 +19,7 @@ from drillctrl.records.downhole import (
     carried,
     check_surface,
     drive_inertia,
+    mean_weight,
     prepare,
     relative_weight,
 )
@@ -41,7 +42,7 @@ _SPEED_UNIT, _TORQUE_UNIT = 0.005, 0.01
 _FIRST_MODES = 3
 # Standard errors of the method itself on recordings of known rigs, beside those of noise: of
 # logarithms, of the lag in s. A sharp corner of the law meets motion whose band ends.
-_METHOD = {"damping": 0.1, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
+_METHOD = {"damping": 0.12, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
 _STRING_METHOD = 0.008
 # Of a string of which nothing was known, pipe above a rigid disc.
 _UNKNOWN_METHOD = {"damping": 0.3, "level": 0.08, "drop": 0.15, "decay": 0.2, "lag": 0.025}
@@ -111,6 +112,8 @@ class RecordFit:
         That was taken from the torque, kg m².
     used, kept_back : (float, float)
         Parts of the record, s: for the fit, and to check it.
+    weight_on_bit : float or None
+        That the law is of, N; None where it was not recorded.
     misfit, misfit_kept_back : float
         Mean distance of the bit from its law in both, in units of what noise explains.
     identifiable : bool
@@ -132,6 +135,7 @@ class RecordFit:
     drive_inertia: float
     used: tuple[float, float]
     kept_back: tuple[float, float]
+    weight_on_bit: float | None
     misfit: float
     misfit_kept_back: float
     identifiable: bool
@@ -160,6 +164,7 @@ class RecordFit:
             "reasons": list(self.reasons),
             "used": list(self.used),
             "kept_back": list(self.kept_back),
+            "weight_on_bit": self.weight_on_bit,
             "misfit": self.misfit,
             "misfit_kept_back": finite_or_none(self.misfit_kept_back),
         }
@@ -228,7 +233,7 @@ def fit_record(
     assert best is not None
     found, family, prepared = best
     found = _with_method(found, family, first, inertia, lag)
-    return _told(record, end, found, family, prepared, inertia, lag, rig is not None)
+    return _told(record, end, found, family, prepared, inertia, lag, mean_weight(first))
 
 
 def _unknown(record: Record) -> list[Family]:
@@ -312,7 +317,7 @@ def _told(
     prepared: Prepared,
     inertia: float,
     lag: float | None,
-    scaled: bool,
+    weight: float | None,
 ) -> RecordFit:
     count = len(family.names)
 
@@ -344,14 +349,17 @@ def _told(
         damping=damping,
         **law,
         lag=late,
-        factors=(found.value("stiffness"), found.value("inertia")) if scaled else None,
+        factors=(found.value("stiffness"), found.value("inertia"))
+        if family.base is not None
+        else None,
         modes=_modes(found, line),
         line=carrier.line,
         drive_inertia=inertia,
         used=(0.0, end),
         kept_back=(end, record.duration),
+        weight_on_bit=weight,
         misfit=math.sqrt(found.cost),
-        misfit_kept_back=_kept_back(record, end, carrier, found.law(), prepared),
+        misfit_kept_back=_kept_back(record, end, carrier, found.law(), prepared, weight),
         identifiable=stiffness.known and mass.known and not _at_bound(found, family),
         reasons=reasons,
     )
@@ -410,7 +418,12 @@ def _modes(found: Descent, line: Callable[[FloatArray], Line]) -> tuple[Peak, ..
 
 
 def _kept_back(
-    record: Record, end: float, carrier: Carrier, law: BitLaw, prepared: Prepared
+    record: Record,
+    end: float,
+    carrier: Carrier,
+    law: BitLaw,
+    prepared: Prepared,
+    weight: float | None,
 ) -> float:
     """Return the mean distance from the law in the part that was not used; NaN without one."""
     try:
@@ -419,8 +432,8 @@ def _kept_back(
     except InputError:
         return math.nan
     known = np.isfinite(motion.speed)
-    weight = relative_weight(rest)
-    torque = motion.torque if weight is None else motion.torque / weight
+    load = relative_weight(rest, weight)
+    torque = motion.torque if load is None else motion.torque / load
     off = law.distance(motion.speed[known], torque[known], prepared.units)
     # The loss of the fit, so that both can be compared.
     return math.sqrt(float(8.0 * (np.sqrt(1.0 + (off / 2.0) ** 2) - 1.0).mean()))
