@@ -10,7 +10,7 @@ from drillctrl.base import units
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.drilling.rig import Rig
-from drillctrl.records.fitting import RecordFit
+from drillctrl.records.fit_values import RecordFit
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.rig import StringRig, string_rig
 
