@@ -113,10 +113,10 @@ from .paper.reproduce import reproduce as reproduce
 from .records.downhole import Downhole as Downhole
 from .records.downhole import bit_from_surface as bit_from_surface
 from .records.example import example_path as example_path
+from .records.fit_values import Estimate as Estimate
+from .records.fit_values import RecordFit as RecordFit
 from .records.fitted_rig import fitted_rig as fitted_rig
 from .records.fitted_rig import save_fit as save_fit
-from .records.fitting import Estimate as Estimate
-from .records.fitting import RecordFit as RecordFit
 from .records.fitting import fit_record as fit_record
 from .records.record import Record as Record
 from .records.record import read_record as read_record

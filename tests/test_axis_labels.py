@@ -20,14 +20,17 @@ from drillctrl import (
     compare,
     compare_drives,
     dimensionless_grid,
+    example_path,
     gain_surface,
     linear_axis,
     load_rig,
+    read_record,
     rig_grid,
     root_locus,
     simulate,
     stabilisable_chart,
     stability_volume,
+    study_record,
     table,
     table1,
     vibration_map,
@@ -41,7 +44,21 @@ from drillctrl.simulation.figure import (
 )
 from drillctrl.strings.figure import plot_rig
 
-OF_RIGS = ("rpm", "m/h", "kN", "kN·m", "s", "Hz", "1/s", "mm", "m", "MPa", "rad", "N·m·s/rad")
+OF_RIGS = (
+    "rpm",
+    "m/h",
+    "kN",
+    "kN·m",
+    "s",
+    "Hz",
+    "1/s",
+    "mm",
+    "m",
+    "MPa",
+    "rad",
+    "N·m·s/rad",
+    "kN·m/√Hz",
+)
 PLAIN = ("%", "% of critical", "°", "share of Ω0", "multiples of the disturbance", "dimensionless")
 RIG = table1()
 DRILLING = RigPoint(RIG, 120 * pi / 30, 20 / 3600)
@@ -211,6 +228,14 @@ def test_of_strings():
     rig = load_rig("vertical-3000")
     check(plot_rig(check_rig(rig)), "m", "mm")
     check(compare_drives(rig, ["stiff"]).plot(), "Hz")
+
+
+def test_of_records():
+    study = study_record(read_record(example_path("record")).part(300.0, 600.0), fit=False)
+    check(study.plot(), "s", "rpm", "kN·m", "Hz", "kN·m/√Hz", "kN", "N·m·s/rad")
+    rig = load_rig(example_path("rig"))
+    carried = study_record(read_record(example_path("record")).part(0.0, 200.0), rig, fit=False)
+    check(carried.plot(), "s", "rpm", "kN·m", "Hz", "kN")
 
 
 def test_no_label_is_left_out_of_the_sources():

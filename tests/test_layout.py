@@ -33,6 +33,7 @@ RESULTS = (
         "studies.vibration_values",
         "records.study",
         "records.findings",
+        "records.fit_values",
         "records.fitting",
     ),
 )

@@ -18,9 +18,6 @@ from drillctrl.base.errors import InputError, checked_number
 if TYPE_CHECKING:
     import pint
 
-# What pint lets through of those that its parser meets.
-_REFUSED = (AssertionError, AttributeError, TypeError, ValueError)
-
 
 @dataclass(frozen=True)
 class Dimension:
@@ -131,6 +128,9 @@ _TWO_READINGS = {
 # Turns a minute, as they stand on motors and in European data sheets.
 _TURNS_A_MINUTE = ("1/min", "/min", "min^-1", "min⁻¹", "r/min")
 
+# What pint raises beside its own errors for a text that is no unit.
+_UNREADABLE = (AssertionError, AttributeError, TypeError, ValueError, tokenize.TokenError)
+
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
 _FRACTION = r"(?:(?P<whole>\d{1,4})[ -])?(?P<over>\d{1,3})/(?P<under>\d{1,3})(?=[ \"'a-z])"
 _POWER = r"(?<=[A-Za-z])[2-4](?![\w^*.])|(?:\^|\*\*)-?[1-4](?![\d*^])"
@@ -189,7 +189,7 @@ def to_si(parameter: str, value: object, dimension: Dimension) -> float:
         try:
             si = _converted(float(number), unit, dimension)
             break
-        except (pint.PintError, tokenize.TokenError, *_REFUSED):
+        except (pint.PintError, *_UNREADABLE):
             continue
     if si is None:
         raise InputError(parameter, repr(value), permitted)
@@ -248,7 +248,7 @@ def known_unit(text: str) -> bool:
     for unit in (*_readings(text, NUMBER), *_readings(text, ROTARY_SPEED)):
         try:
             _registry().Quantity(1.0, unit)
-        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+        except (pint.PintError, *_UNREADABLE):
             continue
         return True
     return text in _TWO_READINGS

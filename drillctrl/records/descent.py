@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,6 +75,7 @@ def descend(
     free_lag: bool = False,
     margin: int = 0,
     block: int = 400,
+    together: int = 1,
     rounds: int = 60,
     begin: FloatArray | None = None,
 ) -> Descent:
@@ -98,6 +99,8 @@ def descend(
         Samples left out at both ends of each stretch.
     block : int
         Samples of a block of time.
+    together : int
+        Samples whose distances are averaged: what rings at the edge of the band cancels.
     rounds : int
         Most steps.
     begin : array, (p,), optional
@@ -137,7 +140,9 @@ def descend(
             if len(kept) > 12:
                 kept.clear()
             kept[key] = points(parameters)
-        return law_of(parameters).distance(*kept[key], units)
+        off = law_of(parameters).distance(*kept[key], units)
+        whole = off[: off.size - off.size % together]
+        return np.asarray(whole.reshape(-1, together).mean(axis=1))
 
     if begin is not None:
         parameters = np.concatenate([np.log(begin[: count + 3]), begin[count + 3 :]])
@@ -147,10 +152,47 @@ def descend(
         diff_step=1e-4, max_nfev=rounds,
     )  # fmt: skip
     jacobian, left = np.asarray(found.jac), np.asarray(found.fun)
-    spread, blocks = _spread(jacobian, left, block)
+    spread, blocks = _spread(jacobian, left, max(1, block // together))
     values = np.concatenate([np.exp(found.x[: count + 3]), found.x[count + 3 :]])
     names = (*family.names, *LAW, *(("lag",) if free_lag else ()))
     return Descent(names, values, spread, 2.0 * float(found.cost) / left.size, blocks)
+
+
+def with_sharper_law(
+    found: Descent,
+    family: Family,
+    stretches: Sequence[Stretch],
+    units: tuple[float, float],
+    inertia: float,
+    lag: float,
+    margin: int,
+) -> Descent:
+    """Return a descent whose law is fitted anew to every sample, the string as it is.
+
+    Means over time, which tell the string best, blur a law that the bit runs through quickly.
+    Parameters as of `descend`.
+    """
+    import scipy.optimize
+
+    count = len(family.names)
+    carrier = Carrier(family.line(found.values[:count].tolist()), inertia, lag)
+    pairs = [
+        (a[margin : a.size - margin], (b / stretch.weight)[margin : b.size - margin])
+        for stretch in stretches
+        for a, b in (carrier.at_bit(stretch),)
+    ]
+    speed, torque = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    most = max(2.0, _MOST_DROP * float(np.quantile(np.abs(torque), 0.99)))
+    low, high = np.log(_LAW_LOW), np.log((_LAW_HIGH[0], most, _LAW_HIGH[2]))
+    place = slice(count, count + 3)
+    start = np.clip(np.log(found.values[place]), low + 1e-6, high - 1e-6)
+    law = scipy.optimize.least_squares(
+        lambda p: BitLaw(*np.exp(p).tolist()).distance(speed, torque, units),
+        start, bounds=(low, high), loss=_LOSS, f_scale=2.0, max_nfev=60,
+    )  # fmt: skip
+    values = found.values.copy()
+    values[place] = np.exp(law.x)
+    return replace(found, values=values)
 
 
 def _spread(jacobian: FloatArray, left: FloatArray, block: int) -> tuple[FloatArray, int]:

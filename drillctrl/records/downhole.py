@@ -26,7 +26,7 @@ from drillctrl.strings.rig import StringRig
 # Stretches shorter than this are not carried down, s; spectra are of pieces of so much.
 _SHORTEST, _PIECE = 60.0, 40.0
 # Weight on bit is taken over so many seconds, and as at least so much of its mean.
-_SMOOTH, _LEAST_WEIGHT = 5.0, 0.1
+_SMOOTH, _LEAST_WEIGHT, _MOST_MISSING = 5.0, 0.1, 0.2
 TORQUE_OF = ("drive", "pipe")
 
 
@@ -147,7 +147,7 @@ def prepare(
         highest = narrower * best_highest(carrier, spectra, record.step)
     else:
         spectra, highest = like.spectra, like.highest
-    weight = relative_weight(record)
+    weight = relative_weight(record, mean_weight(record))
     reach = 20.0 + 4.0 * transit
     stretches = tuple(
         transformed(speed, torque, cut, record.step, spectra, reach, highest, weight)
@@ -159,18 +159,26 @@ def prepare(
     return Prepared(spectra, stretches, highest, (float(about[0]), float(about[1])), margin)
 
 
-def relative_weight(record: Record) -> FloatArray | None:
-    """Return weight on bit over its mean, over some seconds; None where it is not known."""
+def mean_weight(record: Record) -> float | None:
+    """Return the mean weight on bit, N; None where it is not known well enough to be used."""
+    weight = record.values.get("weight_on_bit")
+    if weight is None or np.isnan(weight).mean() > _MOST_MISSING or not np.nanmean(weight) > 0.0:
+        return None
+    return float(np.nanmean(weight))
+
+
+def relative_weight(record: Record, reference: float | None) -> FloatArray | None:
+    """Return weight on bit over a reference, over some seconds; None without either."""
     from scipy.ndimage import uniform_filter1d
 
-    weight = record.values.get("weight_on_bit")
-    if weight is None or np.isnan(weight).mean() > 0.2 or not np.nanmean(weight) > 0.0:
+    if reference is None or mean_weight(record) is None:
         return None
+    weight = record.values["weight_on_bit"]
     known = np.flatnonzero(np.isfinite(weight))
     filled = np.interp(np.arange(weight.size), known, weight[known])
     smooth = uniform_filter1d(filled, max(1, int(_SMOOTH / record.step)), mode="nearest")
     # Off bottom there is no law to obey.
-    return np.asarray(np.maximum(smooth / smooth.mean(), _LEAST_WEIGHT))
+    return np.asarray(np.maximum(smooth / reference, _LEAST_WEIGHT))
 
 
 def record_spectra(record: Record) -> Spectra | None:

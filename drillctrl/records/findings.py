@@ -11,7 +11,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.text import finite_or_none
 from drillctrl.records.downhole import Downhole
 from drillctrl.records.drive_seen import DriveSeen
-from drillctrl.records.fitting import RecordFit
+from drillctrl.records.fit_values import RecordFit
 from drillctrl.records.peaks import Peak
 from drillctrl.records.record import Record
 from drillctrl.records.swings import Period, Windows, window_means

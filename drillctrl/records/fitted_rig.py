@@ -11,7 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
-from drillctrl.records.fitting import RecordFit
+from drillctrl.records.fit_values import RecordFit
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.rig import StringRig, string_rig
 

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.base.text import finite_or_none
 from drillctrl.drilling.rig import Rig
-from drillctrl.records.descent import LAW, Descent, descend
+from drillctrl.records.descent import LAW, Descent, descend, with_sharper_law
 from drillctrl.records.downhole import (
     Prepared,
     carried,
     check_surface,
     drive_inertia,
+    mean_weight,
     prepare,
     relative_weight,
 )
 from drillctrl.records.families import Family, family_of, unknown_family
+from drillctrl.records.fit_values import Estimate, RecordFit
 from drillctrl.records.law import BitLaw
 from drillctrl.records.peaks import Peak
 from drillctrl.records.record import Record
@@ -34,136 +34,21 @@ from drillctrl.strings.line import Line
 
 # Twice the standard error holds the truth in 95 of 100.
 _TWICE = 2.0
-# What is less well known than this is not known (95 %, relative).
-_KNOWN = 0.25
 _USED = 0.7
 # Errors that no noise explains: edges of the band, a law that is not quite a bit's.
 _SPEED_UNIT, _TORQUE_UNIT = 0.005, 0.01
 _FIRST_MODES = 3
+# Distances from the law are averaged over so many seconds.
+_TOGETHER = 0.4
 # Standard errors of the method itself on recordings of known rigs, beside those of noise: of
 # logarithms, of the lag in s. A sharp corner of the law meets motion whose band ends.
-_METHOD = {"damping": 0.1, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
+_METHOD = {"damping": 0.12, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
 _STRING_METHOD = 0.008
 # Of a string of which nothing was known, pipe above a rigid disc.
 _UNKNOWN_METHOD = {"damping": 0.3, "level": 0.08, "drop": 0.15, "decay": 0.2, "lag": 0.025}
 _UNKNOWN_STRING = 0.015
-# A misfit that noise does not explain: torque may come later than the first guess.
-_POOR, _LATER = 1.2, 0.12
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number that was fitted.
-
-    Attributes
-    ----------
-    value : float
-        In SI units.
-    low, high : float
-        Its 95 % interval.
-    """
-
-    value: float
-    low: float
-    high: float
-
-    @property
-    def relative(self) -> float:
-        """Half the interval over the value."""
-        return (self.high - self.low) / (2.0 * self.value) if self.value else math.inf
-
-    @property
-    def known(self) -> bool:
-        """Whether the record says it to a quarter."""
-        return self.relative < _KNOWN
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON fields."""
-        return {
-            "value": self.value,
-            "low": finite_or_none(self.low),
-            "high": finite_or_none(self.high),
-            "known": self.known,
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class RecordFit:
-    """A string and a bit's law that were fitted to a recording.
-
-    Attributes
-    ----------
-    stiffness, inertia : Estimate
-        Effective: of the string lumped to one spring and one disc, N m/rad and kg m².
-    damping : Estimate
-        Viscous, over the inertia, 1/s.
-    level, drop, decay : Estimate
-        Of the bit's law, N m, N m and rad/s: level + drop · exp(−speed/decay). The level holds
-        friction along the string as well.
-    lag : Estimate
-        By which the torque comes later than the speed, s; its interval may hold 0.
-    factors : (float, float) or None
-        Stiffness and inertia over those of the rig that was given.
-    modes : tuple of Peak
-        Of the fitted string, top held, bit free.
-    line : Line
-        The fitted string in torsion.
-    drive_inertia : float
-        That was taken from the torque, kg m².
-    used, kept_back : (float, float)
-        Parts of the record, s: for the fit, and to check it.
-    misfit, misfit_kept_back : float
-        Mean distance of the bit from its law in both, in units of what noise explains.
-    identifiable : bool
-        Whether stiffness and inertia are known to a quarter, and so the string.
-    reasons : tuple of str
-        What the record does not say, and why.
-    """
-
-    stiffness: Estimate
-    inertia: Estimate
-    damping: Estimate
-    level: Estimate
-    drop: Estimate
-    decay: Estimate
-    lag: Estimate
-    factors: tuple[float, float] | None
-    modes: tuple[Peak, ...]
-    line: Line
-    drive_inertia: float
-    used: tuple[float, float]
-    kept_back: tuple[float, float]
-    misfit: float
-    misfit_kept_back: float
-    identifiable: bool
-    reasons: tuple[str, ...]
-
-    @property
-    def law(self) -> BitLaw:
-        """The bit's law."""
-        return BitLaw(self.level.value, self.drop.value, self.decay.value)
-
-    @property
-    def carrier(self) -> Carrier:
-        """What carries speed and torque down to the bit."""
-        return Carrier(self.line, self.drive_inertia, self.lag.value)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON fields."""
-        names = ("stiffness", "inertia", "damping", "level", "drop", "decay", "lag")
-        return {
-            **{name: getattr(self, name).to_dict() for name in names},
-            "factors": None
-            if self.factors is None
-            else dict(zip(("stiffness", "inertia"), self.factors, strict=True)),
-            "modes": [mode._asdict() for mode in self.modes],
-            "identifiable": self.identifiable,
-            "reasons": list(self.reasons),
-            "used": list(self.used),
-            "kept_back": list(self.kept_back),
-            "misfit": self.misfit,
-            "misfit_kept_back": finite_or_none(self.misfit_kept_back),
-        }
+# Lags to begin at, s, and the steps after which the better one is told.
+_SOONER, _LATER, _FEW, _MANY = 0.01, 0.12, 15, 60
 
 
 @checks_kinds
@@ -221,16 +106,19 @@ def fit_record(
     best: tuple[Descent, Family, Prepared] | None = None
     for family in families:
         prepared = _floored(prepare(first, Carrier(family.line(family.start), inertia)), first)
-        found = _descended(family, prepared, inertia, lag, first.step, None)
-        if lag is None and found.cost > _POOR:
-            later = _descended(family, prepared, inertia, lag, first.step, None, _LATER)
-            found = later if later.cost < found.cost else found
+        lags = (_SOONER, _LATER) if lag is None else (lag,)
+        starts = [
+            _descended(family, prepared, inertia, lag, first.step, None, late, _FEW)
+            for late in lags
+        ]
+        found = min(starts, key=lambda each: each.cost)
         if best is None or found.cost < best[0].cost:
             best = found, family, prepared
     assert best is not None
     found, family, prepared = best
-    found = _with_method(found, family, first, inertia, lag)
-    return _told(record, end, found, family, prepared, inertia, lag, rig is not None)
+    found = _descended(family, prepared, inertia, lag, first.step, found.values)
+    found = _with_method(found, family, first, inertia, lag, prepared)
+    return _told(record, end, found, family, prepared, inertia, lag, mean_weight(first))
 
 
 def _unknown(record: Record) -> list[Family]:
@@ -274,6 +162,7 @@ def _descended(
     step: float,
     begin: FloatArray | None,
     late: float = 0.0,
+    rounds: int = _MANY,
 ) -> Descent:
     return descend(
         family,
@@ -284,14 +173,21 @@ def _descended(
         free_lag=lag is None,
         margin=prepared.margin,
         block=max(10, int(20.0 / step)),
+        together=max(1, int(_TOGETHER / step)),
         begin=begin,
+        rounds=rounds,
     )
 
 
 def _with_method(
-    found: Descent, family: Family, record: Record, inertia: float, lag: float | None
+    found: Descent,
+    family: Family,
+    record: Record,
+    inertia: float,
+    lag: float | None,
+    wide: Prepared,
 ) -> Descent:
-    """Return a descent whose spread holds what a band narrower by a third changes as well."""
+    """Return a descent with a sharper law, its spread with what a narrower band changes."""
     late = found.value("lag") if lag is None else lag
     carrier = Carrier(family.line(found.values[: len(family.names)].tolist()), inertia, late)
     narrow = _floored(prepare(record, carrier, narrower=0.67), record)
@@ -302,6 +198,7 @@ def _with_method(
     of_law, of_string = _METHOD, _STRING_METHOD
     if family.base is None:
         of_law, of_string = _UNKNOWN_METHOD, _UNKNOWN_STRING
+    found = with_sharper_law(found, family, wide.stretches, wide.units, inertia, late, wide.margin)
     method = [of_law.get(name, of_string) ** 2 for name in found.names]
     return replace(found, spread=found.spread + np.outer(moved, moved) + np.diag(method))
 
@@ -314,7 +211,7 @@ def _told(
     prepared: Prepared,
     inertia: float,
     lag: float | None,
-    scaled: bool,
+    weight: float | None,
 ) -> RecordFit:
     count = len(family.names)
 
@@ -339,6 +236,11 @@ def _told(
     mass = estimate(lambda v: family.effective(v.tolist())[1])
     damping = parameter("damping")
     carrier = Carrier(line(found.values), inertia, late.value)
+    first = record.part(0.0, end)
+    try:
+        rest = record.part(end + record.step, record.duration)
+    except InputError:
+        rest = None
     reasons = _reasons(found, family, stiffness, mass, damping, law)
     return RecordFit(
         stiffness=stiffness,
@@ -346,14 +248,17 @@ def _told(
         damping=damping,
         **law,
         lag=late,
-        factors=(found.value("stiffness"), found.value("inertia")) if scaled else None,
+        factors=(found.value("stiffness"), found.value("inertia"))
+        if family.base is not None
+        else None,
         modes=_modes(found, line),
         line=carrier.line,
         drive_inertia=inertia,
         used=(0.0, end),
         kept_back=(end, record.duration),
-        misfit=math.sqrt(found.cost),
-        misfit_kept_back=_kept_back(record, end, carrier, found.law(), prepared),
+        weight_on_bit=weight,
+        misfit=_misfit(first, carrier, found.law(), prepared, weight),
+        misfit_kept_back=_misfit(rest, carrier, found.law(), prepared, weight),
         identifiable=stiffness.known and mass.known and not _at_bound(found, family),
         reasons=reasons,
     )
@@ -411,18 +316,23 @@ def _modes(found: Descent, line: Callable[[FloatArray], Line]) -> tuple[Peak, ..
     return tuple(peaks)
 
 
-def _kept_back(
-    record: Record, end: float, carrier: Carrier, law: BitLaw, prepared: Prepared
+def _misfit(
+    record: Record | None,
+    carrier: Carrier,
+    law: BitLaw,
+    prepared: Prepared,
+    weight: float | None,
 ) -> float:
-    """Return the mean distance from the law in the part that was not used; NaN without one."""
+    """Return the mean distance of the bit from a law; NaN where it cannot be carried down."""
+    if record is None:
+        return math.nan
     try:
-        rest = record.part(end + record.step, record.duration)
-        motion = carried(rest, carrier, prepare(rest, carrier, like=prepared))
+        motion = carried(record, carrier, prepare(record, carrier, like=prepared))
     except InputError:
         return math.nan
     known = np.isfinite(motion.speed)
-    weight = relative_weight(rest)
-    torque = motion.torque if weight is None else motion.torque / weight
+    load = relative_weight(record, weight)
+    torque = motion.torque if load is None else motion.torque / load
     off = law.distance(motion.speed[known], torque[known], prepared.units)
-    # The loss of the fit, so that both can be compared.
+    # Far points count as in the fit.
     return math.sqrt(float(8.0 * (np.sqrt(1.0 + (off / 2.0) ** 2) - 1.0).mean()))

@@ -10,7 +10,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.figure import new_axes, new_figure
 from drillctrl.records import figure as drawing
-from drillctrl.records.downhole import relative_weight
+from drillctrl.records.downhole import mean_weight, relative_weight
 from drillctrl.records.peaks import spectral_density
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
     if drilled is not None:
         found.append(("What was drilled", drilled))
     if bit is not None:
-        found.append((_LAW if relative_weight(record) is None else _AT_MEAN, _law(study)))
+        found.append((_LAW if _reference(study) is None else _AT_MEAN, _law(study)))
     return found
 
 
@@ -155,12 +155,18 @@ def _drilled(study: Findings) -> Callable[[Axes], None] | None:
     return lambda ax: drawing.plot_drilled(ax, speed, weight, swing, "")
 
 
+def _reference(study: Findings) -> float | None:
+    """Return the weight that the law is drawn for, N."""
+    fit = study.fit
+    return mean_weight(study.record) if fit is None else fit.weight_on_bit
+
+
 def _law(study: Findings) -> Callable[[Axes], None]:
     bit = study.bit
     assert bit is not None
     known = np.flatnonzero(np.isfinite(bit.speed))
     known = known[:: max(1, known.size // _MOST_POINTS)]
-    weight = relative_weight(study.record)
+    weight = relative_weight(study.record, _reference(study))
     torque = bit.torque if weight is None else bit.torque / weight
     speed, torque = bit.speed[known], torque[known]
     law = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drillctrl.base.templates import filled
@@ -24,7 +25,7 @@ def record_page(study: Findings) -> str:
     return filled(
         "drillctrl.records",
         "record.html.j2",
-        source=record.source,
+        source=Path(record.source).name,
         verdict=verdict(study),
         rows=record_rows(study),
         columns=[(t.quantity.replace("_", " "), t.column, t.unit or "") for t in record.taken],

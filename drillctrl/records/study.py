@@ -21,7 +21,8 @@ from drillctrl.records.downhole import (
 from drillctrl.records.drive_seen import DriveSeen, drive_seen
 from drillctrl.records.families import line_of
 from drillctrl.records.findings import Findings, median
-from drillctrl.records.fitting import RecordFit, fit_record
+from drillctrl.records.fit_values import RecordFit
+from drillctrl.records.fitting import fit_record
 from drillctrl.records.peaks import Peak, spectral_modes
 from drillctrl.records.record import Record
 from drillctrl.records.surface import Carrier

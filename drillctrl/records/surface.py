@@ -19,6 +19,8 @@ from drillctrl.strings.line import Line
 _FLOOR = (0.6, 0.95)
 _MOST_HERTZ = 8.0
 _NEARLY_NOTHING = 1e-6
+# A piece whose mean speed changes by this share is no steady drilling.
+_CHANGED = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +89,17 @@ def surface_spectra(
     size = min(int(longest / step), *(data.size for data in speed))
     window = np.hanning(size)
     total, count = np.zeros((size // 2 + 1, 2, 2), dtype=complex), 0
-    for first, second in zip(speed, torque, strict=True):
-        for begin in range(0, first.size - size + 1, max(1, size // 2)):
-            cut = [data[begin : begin + size] for data in (first, second)]
-            both = np.stack(
-                [np.fft.rfft(window * scipy.signal.detrend(data)) for data in cut], axis=-1
-            )
-            total += both[:, :, None] * both[:, None, :].conj()
-            count += 1
+    cuts = [
+        (first[begin : begin + size], second[begin : begin + size])
+        for first, second in zip(speed, torque, strict=True)
+        for begin in range(0, first.size - size + 1, max(1, size // 2))
+    ]
+    # Where the driller turns the knob it is not the bit alone that moves both.
+    steady = [cut for cut in cuts if _is_steady(cut[0])]
+    for cut in steady or cuts:
+        both = np.stack([np.fft.rfft(window * scipy.signal.detrend(d)) for d in cut], axis=-1)
+        total += both[:, :, None] * both[:, None, :].conj()
+        count += 1
     matrix = total / count * (2.0 * step / (window**2).sum())
     frequency = np.fft.rfftfreq(size, step)
     top = frequency[-1]
@@ -106,6 +111,12 @@ def surface_spectra(
     noise = np.maximum(noise, 1e-12 * whole.max(axis=1) + 1e-30)
     floor = np.asarray(noise, dtype=np.float64)
     return Spectra(np.asarray(frequency), matrix, floor, 0.5 * count + 0.5)
+
+
+def _is_steady(speed: FloatArray) -> bool:
+    quarter = max(1, speed.size // 4)
+    change = abs(speed[:quarter].mean() - speed[-quarter:].mean())
+    return bool(change < _CHANGED * abs(speed.mean()))
 
 
 def extended(data: FloatArray, more: int) -> tuple[FloatArray, float]:

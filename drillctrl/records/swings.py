@@ -16,7 +16,7 @@ _SLOWEST, _FASTEST = 0.02, 2.0
 STICKS_BELOW = 0.05
 # Of a swing, left after so many periods where it keeps itself up, and the windows where it must.
 _MEMORY, _KEPT, _SHARE = 4.0, 0.6, 0.5
-_PERIODS = 8.0
+_PERIODS, _OTHER = 8.0, 0.3
 
 
 class Period(NamedTuple):
@@ -72,6 +72,9 @@ def period_of(data: FloatArray, step: float, segments: list[slice]) -> Period | 
     known = np.isfinite(periods)
     if known.sum() < max(1.0, _SHARE * periods.size):
         return None
+    # A window in which something else swings is none of this swing.
+    periods[np.abs(periods / np.median(periods[known]) - 1.0) > _OTHER] = np.nan
+    known = np.isfinite(periods)
     drift = 0.0
     if known.sum() > 2:
         drift = 3600.0 * float(np.polyfit(middles[known], periods[known], 1)[0])

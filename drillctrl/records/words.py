@@ -10,7 +10,7 @@ from drillctrl.base.text import set_out, wrapped
 
 if TYPE_CHECKING:
     from drillctrl.records.findings import Findings
-    from drillctrl.records.fitting import Estimate, RecordFit
+    from drillctrl.records.fit_values import Estimate, RecordFit
 
 _RPM = 30.0 / np.pi
 _FULL = 1.0

@@ -122,7 +122,7 @@ def test_a_string_is_fitted_that_was_taken_wrong(sticking, tmp_path):
     truth = np.median([np.ptp(w) / (2 * w.mean()) for w in bit[:7600].reshape(-1, 400)])
     assert study.swing == pytest.approx(truth, abs=0.05)
     assert study.swing_from == "surface"
-    assert fit.misfit_kept_back < 2.0 * fit.misfit
+    assert fit.misfit_kept_back < 1.5 * fit.misfit
     # The drive is a PI law above its own inertia.
     seen = study.drive
     s = 2j * np.pi * seen.frequency

@@ -1,0 +1,125 @@
+"""The rig that a recording tells, as a file, and the box that worst-case design takes from it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    Estimate,
+    InputError,
+    RecordFit,
+    RigPoint,
+    check_rig,
+    cli,
+    fitted_rig,
+    load_rig,
+    save_fit,
+    string_preset,
+    table1,
+)
+from drillctrl.designs.worst_case import fitted_box
+from drillctrl.records.families import line_of, scaled
+from drillctrl.strings.files import fitted_errors
+
+
+def fit_of(rig, stiffer=1.1, heavier=0.95, damping=0.2):
+    def about(value, error=0.02):
+        return Estimate(value, value * (1.0 - error), value * (1.0 + error))
+
+    return RecordFit(
+        stiffness=about(stiffer * rig.torsional_stiffness),
+        inertia=about(heavier * rig.inertia, 0.03),
+        damping=about(damping, 0.2),
+        level=about(4e3),
+        drop=about(2e3),
+        decay=about(5.0),
+        lag=Estimate(0.0, -0.01, 0.01),
+        factors=(stiffer, heavier),
+        modes=(),
+        line=scaled(line_of(rig), stiffer, heavier, damping),
+        drive_inertia=0.0,
+        used=(0.0, 700.0),
+        kept_back=(700.0, 1000.0),
+        weight_on_bit=None,
+        misfit=0.5,
+        misfit_kept_back=0.5,
+        identifiable=True,
+        reasons=(),
+    )
+
+
+@pytest.mark.parametrize("name", ["vertical-3000", "deep-5000", "paper-string"])
+def test_a_string_comes_back_as_it_was_fitted(name, tmp_path):
+    rig = string_preset(name)
+    fit = fit_of(rig)
+    save_fit(rig, fit, tmp_path / "fitted.toml")
+    read = load_rig(tmp_path / "fitted.toml")
+    s = 2j * np.pi * np.array([0.1, 0.35, 1.0, 3.0])
+    np.testing.assert_allclose(read.string.torsion.transfer(s), fit.line.transfer(s), rtol=1e-9)
+    assert read.torsional_stiffness == pytest.approx(1.1 * rig.torsional_stiffness)
+    assert read.inertia == pytest.approx(0.95 * rig.inertia)
+    assert read.drive == rig.drive
+    assert (read.bit_radius, read.blades) == (rig.bit_radius, rig.blades)
+    first = [check_rig(each).torsional[0].frequency for each in (read, rig)]
+    assert first[0] / first[1] == pytest.approx(np.sqrt(1.1 / 0.95), rel=1e-6)
+
+
+def test_a_lumped_rig_comes_back_too(tmp_path):
+    rig = table1()
+    save_fit(rig, fit_of(rig), tmp_path / "fitted.toml")
+    read = load_rig(tmp_path / "fitted.toml")
+    assert read == fitted_rig(rig, fit_of(rig))
+    assert read.torsional_damping == pytest.approx(0.2 * read.inertia)
+
+
+def test_the_box_of_worst_case_design(tmp_path):
+    rig = table1()
+    save_fit(rig, fit_of(rig), tmp_path / "fitted.toml")
+    errors = fitted_errors(tmp_path / "fitted.toml")
+    assert errors == {"stiffness": pytest.approx(0.02), "inertia": pytest.approx(0.03)}
+    assert fitted_errors("table1") == fitted_errors("vertical-3000") == {}
+    box = fitted_box(errors)
+    # The groups of a rig at the corner of its intervals, to first order.
+    read = load_rig(tmp_path / "fitted.toml")
+    here = RigPoint(read, 12.0, 0.005).operating_point()
+    softer = replace(
+        read, torsional_stiffness=0.98 * read.torsional_stiffness, inertia=1.03 * read.inertia
+    )
+    there = RigPoint(softer, 12.0, 0.005).operating_point()
+    for name, size in box.items():
+        assert getattr(there, name) / getattr(here, name) - 1.0 == pytest.approx(size, rel=0.05)
+
+
+def test_the_box_is_taken_and_told_on_the_command_line(tmp_path, capsys):
+    rig = table1()
+    save_fit(rig, fit_of(rig), tmp_path / "fitted.toml")
+    point = ["--rig", str(tmp_path / "fitted.toml"), "--speed", "150 rpm", "--rop", "20 m/h"]
+    asked = ["--structure", "p", "--objective", "worst-case", "--trials", "none", "--json"]
+    found = []
+    for more in ([], ["--psi-error", "0.05", "--delta0-error", "0.02", "--omega0-error", "0.025"]):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(["design", *point, *asked, *more])
+        assert stop.value.code == 0
+        out, err = capsys.readouterr()
+        found.append((out.split('"K1"')[1].split("]")[0], err))
+    assert found[0][0] == found[1][0]
+    assert "psi by 5.0 %, delta0 by 2.0 %, omega0 by 2.5 %" in found[0][1]
+    assert found[1][1] == ""
+
+
+def test_what_is_not_known_is_not_written(tmp_path):
+    rig, path = table1(), tmp_path / "fitted.toml"
+    for fit, word in (
+        (replace(fit_of(rig), factors=None), "of a rig"),
+        (replace(fit_of(rig), identifiable=False, reasons=("the bit hardly swings",)), "swings"),
+    ):
+        with pytest.raises(InputError, match=word):
+            save_fit(rig, fit, path)
+    with pytest.raises(InputError, match="toml"):
+        save_fit(rig, fit_of(rig), tmp_path / "fitted.csv")
+    assert not path.exists()
+    save_fit(rig, fit_of(rig), path)
+    path.write_text(path.read_text().replace("error = 0.0", "error = 7.0"))
+    with pytest.raises(InputError, match="fit.uncertainty"):
+        fitted_errors(path)
