@@ -145,6 +145,8 @@ BAD = [
     (["simulate", "--table", "none.csv"], "table = none.csv"),
     (["simulate", "--table", "none.csv", "--K1", "3"], "--K1 = 3"),
     (["simulate", "--structure", "p", "--K1", "1e308", "--duration", "1"], "K1 = 1e+308: must"),
+    (["analyze", "--omega0", "1e-300"], "--omega0 = 1e-300: must be such that its loop's roots"),
+    (["analyze", "--structure", "p", "--K1", "1e308"], "--structure --K1 = p 1e308: must be such"),
     (["analyze", "--out", "x" * 5000 + ".json"], "must be a file that can be written (File name"),
     (["simulate", "--structure", "p", "--K1", "1", "--limit", "-3"], "limit = -3.0"),
     (["simulate", "--structure", "p", "--K1", "1", "--limit", "3 kN*m"], "--limit = 3 kN*m"),

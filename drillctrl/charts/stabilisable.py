@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable
@@ -16,10 +17,11 @@ from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.chart import chart
 from drillctrl.charts.decisions import Place, Searched, by_curves, has_curves
 from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
-from drillctrl.charts.scan import ScanLine
+from drillctrl.charts.scan import ScanLine, Scanner
 from drillctrl.charts.scanners import first_position
-from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, Decision, scan_stabilisable
-from drillctrl.charts.sweep import Sweep, sweep
+from drillctrl.charts.searched_scan import SEARCHED_TOLERANCE, SearchedScan
+from drillctrl.charts.stabilisable_scan import CROSSING_TOLERANCE, scan_stabilisable
+from drillctrl.charts.sweep import sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
 from drillctrl.drilling.structures import as_structure
@@ -30,8 +32,7 @@ if TYPE_CHECKING:
     from drillctrl.charts.chart import StabilityChart
 
 # Share of x by which lines are apart at least: those that need a search cost more.
-_NARROWEST, _NARROWEST_SEARCHED = 3e-3, 1.5e-2
-_COARSER = 5.0
+_NARROWEST, _NARROWEST_SEARCHED = 3e-3, 2.5e-2
 # Roots of loops with longer delays crowd the axis, and gains that tame them are not looked for.
 _LONGEST_DELAY = 6.3
 
@@ -232,8 +233,9 @@ def stabilisable_chart(
     -----
     Whether one or two gains exist at a place is decided on the explicit curves of gains that
     hold a root at the line (see `drillctrl.synthesis.gain_margin`). More gains are searched for,
-    from those of places nearby: where they are found a count of roots proves it, where they are
-    not the search may have missed them, so that the area is a lower bound.
+    from those of places nearby (`drillctrl.charts.searched_scan`): where they are found a count
+    of roots proves it, where they are not the search may have missed them, so that the area is a
+    lower bound. At the edge they hold several roots, and its ``omega`` is 0.
     """
     began = time.perf_counter()
     plane = make_plane(point, x, y, None, None, None)
@@ -256,29 +258,27 @@ def stabilisable_chart(
     searched = Searched(plane, chosen, level)
     here = plane.case_at(plane.x.high, plane.y.high).system(chosen.inputs)
     curves = has_curves(here, chosen)
-
-    def swept(decide: Decision, wanted: float) -> Sweep:
-        return sweep(
-            lambda positions: scan_stabilisable(
-                decide, positions, low, plane.y.high, samples=samples, progress=count
-            ),
-            start,
-            plane.x.high,
-            tolerance=wanted,
-            first=first_lines,
-            narrowest=_NARROWEST if curves else _NARROWEST_SEARCHED,
-            inset=0.0,
-        )
-
+    scanner: Scanner
     if curves:
-        result = swept(by_curves(plane, chosen, level), tolerance)
+        scanner = functools.partial(
+            scan_stabilisable, by_curves(plane, chosen, level),
+            low=low, high=plane.y.high, samples=samples, progress=count,
+        )  # fmt: skip
     else:
-        # Once to know gains all over the chart, and again from the gains of lines on both sides.
-        swept(searched, _COARSER * tolerance)
-        result = swept(searched.nearby, tolerance)
+        scanner = SearchedScan(searched, low, plane.y.high, samples, count)
+    result = sweep(
+        scanner,
+        start,
+        plane.x.high,
+        tolerance=tolerance,
+        first=first_lines,
+        narrowest=_NARROWEST if curves else _NARROWEST_SEARCHED,
+        inset=0.0,
+    )
+    accuracy = CROSSING_TOLERANCE if curves else SEARCHED_TOLERANCE
     # Every line carries two crossings or so, each within the tolerance of its root finder.
     most = max((line.at.size for line in result.lines), default=0)
-    crossing = most * CROSSING_TOLERANCE * plane.y.span * plane.x.span
+    crossing = most * accuracy * plane.y.span * plane.x.span
     return StabilisableChart(
         plane,
         chosen,

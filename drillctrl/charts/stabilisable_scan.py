@@ -86,8 +86,7 @@ def _scan(
     samples: int,
 ) -> ScanLine:
     def value(y: float, everywhere: bool = False) -> float:
-        # Brackets need finite ends, and the margin is infinite where no curve is in reach.
-        return float(np.clip(decide(y, everywhere).margin, -_CEILING, _CEILING))
+        return bounded_margin(decide(y, everywhere).margin)
 
     at = np.linspace(low, high, samples)
     found = np.array([value(y, True) for y in at.tolist()])
@@ -110,14 +109,39 @@ def _scan(
         inner = tolerance if found[i + 1] < 0.0 else -tolerance
         crossings.append(place)
         omega.append(decide(float(np.clip(place + inner, low, high)), False).omega)
-    stable = found[0] < 0.0
+    return reached_line(position, low, high, bool(found[0] < 0.0), crossings, omega)
+
+
+def bounded_margin(margin: float) -> float:
+    """Return a margin that brackets can take: it is infinite where nothing is in reach."""
+    return float(np.clip(margin, -_CEILING, _CEILING))
+
+
+def reached_line(
+    position: float,
+    low: float,
+    high: float,
+    stable: bool,
+    crossings: list[float],
+    omega: list[float],
+) -> ScanLine:
+    """Return a line on which places in reach and out of reach take turns.
+
+    Parameters
+    ----------
+    position, low, high : float
+        x, and the ends of the line.
+    stable : bool
+        Whether gains exist at its low end.
+    crossings, omega : list of float
+        Where that changes, and the frequency of the root that is held there.
+    """
     counts = [0 if stable ^ (k % 2 == 1) else 1 for k in range(len(crossings) + 1)]
     jump = np.array([b - a for a, b in itertools.pairwise(counts)], dtype=np.int64)
-    speeds = np.nan_to_num(np.array(omega, dtype=float))
     return ScanLine(
         position,
         np.array(crossings, dtype=float),
-        speeds,
+        np.nan_to_num(np.array(omega, dtype=float)),
         jump,
         np.array(counts, dtype=np.int64),
         low,

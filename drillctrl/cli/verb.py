@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 import click
 
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, UndecidedError
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+# Options by which one point and one loop is chosen.
+_OF_THE_LOOP = (
+    *("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades"),
+    *("rig", "speed", "rop", "wob", "rock_strength", "structure", "k1", "k2"),
+)
 
 
 def with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
@@ -29,7 +35,25 @@ class Verb(click.Command):
         with contextlib.ExitStack() as stack:
             for name, flag in flags.items():
                 stack.enter_context(naming(flag, name))
+            stack.enter_context(_naming_the_loop(ctx, flags))
             return super().invoke(ctx)
+
+
+@contextlib.contextmanager
+def _naming_the_loop(ctx: click.Context, flags: Mapping[str, str]) -> Iterator[None]:
+    """Name the options that a loop was made of where its roots cannot be told apart."""
+    try:
+        yield
+    except UndecidedError as error:
+        typed = {
+            flags[name]: str(ctx.params[name])
+            for name in _OF_THE_LOOP
+            if ctx.params.get(name) not in (None, ())
+        }
+        if error.parameter != "system" or not typed:
+            raise
+        permitted = error.permitted.replace("one whose", "such that its loop's", 1)
+        raise InputError(" ".join(typed), " ".join(typed.values()), permitted) from None
 
 
 @contextlib.contextmanager

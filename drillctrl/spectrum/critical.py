@@ -63,7 +63,7 @@ def critical_points(
     which, columns = np.nonzero(near)
     omega = np.asarray(roots[which, columns].imag, dtype=float)
     phase = -np.angle(found[which])
-    return _sharpened(A0, late, rows[which], omega, phase)
+    return sharpened(A0, late, rows[which], omega, phase)
 
 
 def _candidates(A0: FloatArray, left: FloatArray, right: FloatArray) -> ComplexArray:
@@ -120,7 +120,7 @@ def _eigenvalues(
         return np.asarray(np.where(values == 0.0, np.inf, place - 1.0 / values))
 
 
-def _sharpened(
+def sharpened(
     A0: FloatArray, late: FloatArray, rows: IntArray, omega: FloatArray, phase: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
     """Newton's method on det Δ(iω, φ) = 0; keep what converges nearby, once each."""

@@ -19,6 +19,8 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.characteristic import magnitude_bound
 
 MAX_DEGREE = 400
+# Points of a short delay beyond its share of those of the largest.
+_MORE = 5
 
 
 @functools.lru_cache(maxsize=256)
@@ -64,12 +66,28 @@ def degree_for_reach(reach: float) -> int:
     return min(MAX_DEGREE, 3 + math.ceil(0.55 * reach)) if reach > 0.0 else 1
 
 
+def degrees_for(delays: Sequence[float], degree: int) -> list[int]:
+    """Return the degree for each delay that resolves as much as ``degree`` does for the largest.
+
+    Over a shorter delay exp(−sτ) turns less; a few more see to it that what is resolved to
+    rounding with the largest is so with all.
+    """
+    longest = max(delays, default=1.0)
+    return [min(degree, _MORE + math.ceil(degree * delay / longest)) for delay in delays]
+
+
+def generator_size(system: DelaySystem, degree: int) -> int:
+    """Return the number of rows of `generator_matrix`."""
+    each = zip(degrees_for(system.delays, degree), system.factors, strict=True)
+    return system.order + sum(points * len(right) for points, (_, right) in each)
+
+
 def generator_matrix(
     system: DelaySystem,
     degree: int,
     factors: Sequence[tuple[FloatArray, FloatArray]] | None = None,
 ) -> FloatArray:
-    """Return the collocated generator, shape (n + N Σ ri, n + N Σ ri).
+    """Return the collocated generator, shape (n + Σ Ni ri, n + Σ Ni ri).
 
     The unknowns are X, then for each delay the signals at the nodes, the oldest last.
 
@@ -78,20 +96,21 @@ def generator_matrix(
     system : DelaySystem
         Any number of delays.
     degree : int
-        N ≥ 1, degree of the polynomial on each [−τi, 0].
+        N ≥ 1, degree of the polynomial on the longest [−τi, 0]; for the others see `degrees_for`.
     factors : sequence of (array, array), optional
         Li (n, ri) and Ri (ri, n) of each delay; by default ``system.factors``.
     """
     factors = system.factors if factors is None else factors
     n = system.order
-    size = n + degree * sum(right.shape[0] for _, right in factors)
+    degrees = degrees_for(system.delays, degree)
+    size = n + sum(p * len(right) for p, (_, right) in zip(degrees, factors, strict=True))
     matrix = np.zeros((size, size))
     matrix[:n, :n] = system.A0
     start = n
-    for delay, (left, right) in zip(system.delays, factors, strict=True):
+    for delay, points, (left, right) in zip(system.delays, degrees, factors, strict=True):
         rank = right.shape[0]
-        past, present = _blocks(degree, rank)
-        stop = start + degree * rank
+        past, present = _blocks(points, rank)
+        stop = start + points * rank
         matrix[start:stop, start:stop] = past / delay
         matrix[start:stop, :n] = present @ (right / delay)
         matrix[:n, stop - rank : stop] = left

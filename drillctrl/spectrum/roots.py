@@ -27,6 +27,7 @@ from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,
     generator_eigenvalues,
+    generator_size,
 )
 
 BoolArray = npt.NDArray[np.bool_]
@@ -63,12 +64,10 @@ def _gather(system: DelaySystem, depth: float, line: float | None = None) -> _Ga
 
 def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathered | None:
     """Polish what a collocation that resolves all of it supplies; None beyond its reach."""
-    ranks = sum(left.shape[1] for left, _ in system.factors)
 
     def in_reach(degree: int) -> bool:
-        size = system.order + degree * ranks
         largest = _LARGEST_SHARE * system.order if system.order >= _MANY else _LARGEST
-        return degree < MAX_DEGREE and size <= largest
+        return degree < MAX_DEGREE and generator_size(system, degree) <= largest
 
     # Drawn a little to the left, so that it need not be drawn again for most systems.
     sure = -0.5 / system.max_delay if system.delays else 0.0
@@ -153,7 +152,7 @@ def _first_places(system: DelaySystem) -> ComplexArray:
     ranks = max(1, sum(left.shape[1] for left, _ in system.factors))
     degree = max(4, (_SMALLEST - system.order) // ranks)
     places = [np.linalg.eigvals(system.A0), np.linalg.eigvals(system.A0 + sum(system.delayed))]
-    if system.order + degree * ranks <= _LARGEST:
+    if generator_size(system, degree) <= _LARGEST:
         values = generator_eigenvalues(system, degree)
         places.append(values[np.argsort(-values.real)[:64]])
     return np.concatenate(places).astype(complex)

@@ -55,6 +55,7 @@ def bfgs(
     *,
     most: int = 200,
     tolerance: float = 1e-10,
+    below: float = -np.inf,
 ) -> Descent:
     """Minimise a locally Lipschitz function within a box from one start.
 
@@ -70,6 +71,8 @@ def bfgs(
         Evaluations permitted.
     tolerance : float
         Ends when steps in y or predicted decreases are this small.
+    below : float
+        Ends at the first value below this.
 
     Notes
     -----
@@ -88,7 +91,7 @@ def bfgs(
     used = 1
     inverse = np.eye(y.size)
     first = True
-    while used < most:
+    while used < most and not value < below:
         direction = -inverse @ gradient
         slope = float(gradient @ direction)
         if not slope < -tolerance * 1e-3:

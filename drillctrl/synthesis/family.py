@@ -19,6 +19,7 @@ from drillctrl.spectrum.pseudospectral import (
     _blocks,
     degree_for,
     degree_for_reach,
+    degrees_for,
     generator_matrix,
 )
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -303,7 +304,9 @@ def loop_family(
     base = generator_matrix(plain, degree, [carried[delay] for delay in delays])
     size, n = base.shape[0], system.order
     # The oldest values of the signals of each delay.
-    ends = n + degree * np.cumsum([carried[delay][1].shape[0] for delay in delays], dtype=int)
+    degrees = degrees_for(delays, degree)
+    widths = [p * len(carried[delay][1]) for p, delay in zip(degrees, delays, strict=True)]
+    ends = n + np.cumsum(widths, dtype=int)
     actuation = np.zeros((size, entries.size))
     actuation[:n] = drive[:, target]
     measurement = np.zeros((entries.size, size))
@@ -313,12 +316,13 @@ def loop_family(
         if not lag:
             measurement[row, :n] = measure[output]
             continue
-        right, end = carried[lag][1], ends[delays.index(lag)]
+        place = delays.index(lag)
+        right, points, end = carried[lag][1], degrees[place], ends[place]
         rank = len(right)
         if lag in sent:
             signal = rank - len(sent[lag]) + sent[lag].index(entering)
             actuation[:n, row] = 0.0
-            actuation[end - degree * rank : end, row] = _blocks(degree, rank)[1][:, signal] / lag
+            actuation[end - points * rank : end, row] = _blocks(points, rank)[1][:, signal] / lag
             measurement[row, :n] = measure[output]
         else:
             weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]

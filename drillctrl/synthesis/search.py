@@ -176,8 +176,13 @@ def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[Float
     return Search(best, distinct, hits, evaluations)
 
 
-def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:
-    """Return the best of points spread over the box and over its middle part."""
+def starting_points(
+    family: LoopFamily, seed: int, effort: Effort, *, placed: bool = True
+) -> FloatArray:
+    """Return the best of points spread over the box and over its middle part.
+
+    With ``placed`` gains that make roots coincide are among them.
+    """
     lower, upper = family.feedback.lower, family.feedback.upper
     cube = spread_points(effort.looked, lower.size, seed)
     wide = lower + (upper - lower) * (0.01 + 0.98 * cube)
@@ -186,9 +191,11 @@ def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray
     inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
     values = family.abscissas(points)
     order = np.argsort(values, kind="stable")
-    deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
-    placed = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
-    chosen = np.vstack([placed, points[order[: max(0, effort.begun - len(placed))]]])
+    chosen = points[order[: effort.begun]]
+    if placed:
+        deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
+        explicit = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
+        chosen = np.vstack([explicit, chosen[: max(0, effort.begun - len(explicit))]])
     return np.asarray(np.clip(chosen, inside[0], inside[1]))
 
 
