@@ -106,8 +106,8 @@ class _Family:
     """Laws of one order by a vector of numbers in a box; x is s over a rate.
 
     The vector: h, k over the rate, g; for an odd order the logarithm of a corner c and the parts
-    of it in A and B, each over x/c + 1; for every further two states the logarithm of c, the damping z and
-    two parts each, over (x/c)² + 2 z x/c + 1.
+    of it in A and B, each over x/c + 1; for every further two states the logarithm of c, the
+    damping z and two parts each, over (x/c)² + 2 z x/c + 1.
     """
 
     def __init__(self, order: int, pipe: float, rate: float, machine: DriveMachine) -> None:
