@@ -58,8 +58,19 @@ def _gather(system: DelaySystem, depth: float, line: float | None = None) -> _Ga
     line : float, optional
         Roots right of it are wanted, whatever the depth.
     """
+    if not system.delays:
+        return _eigenvalues(system, depth, line)
     found = _collocated(system, depth, line)
     return _counted(system, depth, line) if found is None else found
+
+
+def _eigenvalues(system: DelaySystem, depth: float, line: float | None) -> _Gathered:
+    """Return the roots of a system without delays: no iteration knows them better."""
+    values = np.linalg.eigvals(system.A0).astype(complex)
+    floor = float(values.real.max()) - depth if line is None else line
+    found = values[(values.imag >= 0.0) & (values.real >= floor)]
+    found = found[np.argsort(-found.real, kind="stable")]
+    return found, np.ones(found.size, dtype=bool), floor
 
 
 def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathered | None:

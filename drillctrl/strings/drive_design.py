@@ -2,11 +2,12 @@
 
 The law brakes by the top's speed and angle and drives by the pipe's torque, with N states:
 
-    A(s) = h + k/s + a(s)/e(s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
+    A(s) = h (1 + k/s) + a(s)/e(s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
 
-e in factors of first and second order that are damped. What is maximised is the smallest
-critical slope over the first modes, over shorter and longer strings and a later drive too. It
-is nonsmooth, as the largest real part of roots is, and BFGS descends it as it does that.
+k not below what brings a speed that sags back in some seconds, e in factors of first and second
+order that are damped. What is maximised is the smallest critical slope over the first modes, over
+shorter and longer strings and a later drive too. It is nonsmooth, as the largest real part of
+roots is, and BFGS descends it as it does that.
 """
 
 from __future__ import annotations
@@ -23,13 +24,22 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
-from drillctrl.strings.slopes import HIGHEST, drive_is_stable, lowest_impedance, mode_bands
+from drillctrl.strings.slopes import (
+    HIGHEST,
+    drive_is_stable,
+    lowest_impedance,
+    mode_bands,
+    mode_slopes,
+)
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.spread import spread_points
 
 MODES = 4
 # Speed gains in units of ζ, torque gains as such; corners in units of the speed that scales s.
-_SPEED_GAIN, _INTEGRAL, _TORQUE_GAIN = 100.0, 200.0, 30.0
+_SPEED_GAIN, _INTEGRAL, _TORQUE_GAIN = 100.0, 5.0, 30.0
+# Seconds in which the integral of speed makes up for as much as the speed does: a drive that
+# yields to the pipe sags under a load, and a bit that turns more slowly sticks sooner.
+_RECOVERS = 10.0
 _CORNER, _DAMPING = (0.1, 30.0), (0.2, 1.5)
 # A swing of the top of 10 rpm must not take more than the torque limit.
 _SMALLEST_SWING = 10.0 * math.pi / 30.0
@@ -96,9 +106,9 @@ class _Drive(NamedTuple):
 class _Family:
     """Laws of one order by a vector of numbers in a box; x is s over a rate.
 
-    The vector: h, k, g; for an odd order the logarithm of a corner c and the parts of it in A
-    and B, each over x/c + 1; for every further two states the logarithm of c, the damping z and
-    two parts each, over (x/c)² + 2 z x/c + 1.
+    The vector: h, k over the rate, g; for an odd order the logarithm of a corner c and the parts
+    of it in A and B, each over x/c + 1; for every further two states the logarithm of c, the
+    damping z and two parts each, over (x/c)² + 2 z x/c + 1.
     """
 
     def __init__(self, order: int, pipe: float, rate: float, machine: DriveMachine) -> None:
@@ -108,7 +118,8 @@ class _Family:
             largest = min(largest, machine.torque_limit / (_SMALLEST_SWING * pipe))
         corner = (math.log(_CORNER[0]), math.log(_CORNER[1]))
         speed, torque = (-_SPEED_GAIN, _SPEED_GAIN), (-_TORQUE_GAIN, _TORQUE_GAIN)
-        rows = [(0.0, largest), (0.02, _INTEGRAL), (0.0, _TORQUE_GAIN)]
+        slowest = min(1.0 / (_RECOVERS * rate), 0.5 * _INTEGRAL)
+        rows = [(0.0, largest), (slowest, _INTEGRAL), (0.0, _TORQUE_GAIN)]
         rows += [corner, speed, torque] * (order % 2)
         rows += [corner, _DAMPING, speed, speed, torque, torque] * (order // 2)
         self.lower, self.upper = np.array(rows).T
@@ -140,7 +151,7 @@ class _Family:
     def ends(self, numbers: FloatArray, drive: _Drive) -> tuple[ComplexArray, ComplexArray]:
         """Return what `DriveControl.ends` does, quickly."""
         x = drive.x
-        speed, torque = numbers[0] + numbers[1] / x, np.asarray(numbers[2], dtype=complex)
+        speed, torque = numbers[0] * (1.0 + numbers[1] / x), np.asarray(numbers[2], dtype=complex)
         for below, a, b in self._sections(numbers):
             under = 1.0 / _value(below, x)
             speed = speed + _value(a, x) * under
@@ -149,7 +160,7 @@ class _Family:
 
     def laws(self, numbers: FloatArray) -> tuple[Transfer, Transfer]:
         """Return A and B."""
-        speed = (np.array([numbers[0], numbers[1]]), np.array([1.0, 0.0]))
+        speed = (numbers[0] * np.array([1.0, numbers[1]]), np.array([1.0, 0.0]))
         torque = (np.array([numbers[2]]), np.ones(1))
         for below, a, b in self._sections(numbers):
             speed, torque = _sum(speed, a, below), _sum(torque, b, below)
@@ -347,8 +358,8 @@ def dynamic_drive_control(
     -------
     DriveControl
         ``dynamic-N``, the best that was found; no order does worse than one of two states less.
-        Where a string is damped so little that high modes make all of these unstable, it is
-        soft torque.
+        Where a string is damped so little that high modes make all of these unstable, or leave
+        nothing better, it is soft torque.
     """
     n = checked_integer("order", order, 0, 4)
     error = checked_number("length_error", length_error, 0.0, 0.5)
@@ -360,14 +371,21 @@ def dynamic_drive_control(
     if machine.delay > 0.0:
         later = replace(machine, delay=_LATER * machine.delay)
         loops.append(_loop(line, later, aim, rate))
-    known = np.array([[4.0, 1.0, 0.0], [30.0, 3.0, 4.0], [40.0, 7.0, 9.0]])
+    known = np.array([[4.0, 0.25, 0.0], [30.0, 0.1, 4.0], [40.0, 0.175, 9.0]])
     for grown in range(n % 2, n + 1, 2):
         family = _Family(grown, line.wave_impedance, rate, machine)
         known = _best(family, _Slopes(family, loops), known)[None, :]
     found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
-    if drive_is_stable(line, found):
-        return found
     soft = soft_torque_control(machine, line.wave_impedance, float(modes[0]))
+
+    def stands(law: DriveControl) -> float:
+        return min(mode.slope for mode in mode_slopes(line, law, MODES))
+
+    # What stands less than soft torque was found for the sake of the longer and shorter strings.
+    if drive_is_stable(line, found) and (
+        stands(found) >= stands(soft) or not drive_is_stable(line, soft)
+    ):
+        return found
     return replace(found, speed=soft.speed, torque=soft.torque)
 
 

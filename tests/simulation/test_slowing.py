@@ -101,6 +101,26 @@ def test_the_designed_law_keeps_the_bit_turning_at_lower_speeds(slowed):
     assert best.linear < z.linear < soft.linear
 
 
+def test_a_string_of_today_with_the_usual_damping():
+    """3000 m: soft torque sticks at 45 rpm, Z-torque at 25, the designed law at neither."""
+    today = string_preset("vertical-3000").with_rock_strength(1e6)
+    today = dataclasses.replace(today, drive=MACHINE)
+    where = RigPoint(today, 100 * RPM, 1e-4 / 3600)
+
+    def swing(control, *speeds):
+        given = [speed * RPM for speed in speeds]
+        return slow_down(where, control, given, hold=40.0).swings[-1]
+
+    soft, z, law = (drive_control(n, today) for n in ("soft-torque", "z-torque", "dynamic-2"))
+    assert swing(soft, 55.0, 45.0) > 1.0
+    assert swing(z, 35.0, 25.0) > 1.0
+    assert swing(law, 35.0, 25.0) < 0.3
+    # The set speed comes back under a load: the integral does so in a minute or less.
+    ki = law.speed.numerator[-1] / law.speed.denominator[-2]
+    kp = abs(law.speed(1e-4j) - ki / 1e-4j)
+    assert kp / ki < 60.0
+
+
 def test_above_the_linear_threshold_nothing_grows(slowed):
     for run in slowed.values():
         quiet = run.swings[(run.speeds > 1.1 * run.linear)]

@@ -226,3 +226,13 @@ def test_a_split_fourfold_root_is_found_whatever_rounding_makes_of_it():
         other = replace(loop, A0=loop.A0 * noise)
         assert spectral_abscissa(other) == pytest.approx(-1.7728024850, abs=1e-6)
         assert dominant_roots(other)[0].rightmost == pytest.approx(-1.7728024850, abs=1e-6)
+
+
+def test_a_critically_damped_pair_without_delay_is_told():
+    """Iterations on its characteristic function come to rest at rounding beside it."""
+    a0 = np.array([[0.0, 0.25], [-0.9907158450717944, -0.9953470977863926]])
+    system = DelaySystem(a0, (), (), np.zeros((2, 0)), np.zeros((0, 2)))
+    (root,) = characteristic_roots(system, -2.0)
+    assert root.multiplicity == 2
+    assert root.value == pytest.approx(np.trace(a0) / 2.0, rel=1e-7)
+    assert spectral_abscissa(system) == pytest.approx(np.trace(a0) / 2.0, rel=1e-7)
