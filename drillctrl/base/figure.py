@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
@@ -53,6 +55,48 @@ def new_axes(width: float = 6.4, height: float = 4.2) -> Axes:
     return new_figure(width, height).add_subplot()
 
 
+def restyled(drawn: Figure | Axes, width: float, points: float) -> Figure:
+    """Return a figure made as wide as a column, all its texts in one size.
+
+    Parameters
+    ----------
+    drawn : Figure or Axes
+        It is changed.
+    width : float
+        mm; the height keeps its proportion.
+    points : float
+        Size of the texts.
+    """
+    from matplotlib.text import Text
+
+    figure = drawn.get_figure(root=True)
+    assert figure is not None
+    across, up = figure.get_size_inches()
+    inches = width / 25.4
+    figure.set_size_inches(inches, inches * up / across)
+    for text in figure.findobj(Text):
+        text.set_fontsize(points)
+    return figure
+
+
+def embedded(drawn: Figure | Axes) -> str:
+    """Return a figure as a base64 text of SVG, for a page that needs no other file."""
+    stream = io.BytesIO()
+    _write(drawn, stream, ".svg")
+    return base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def _write(drawn: Figure | Axes, stream: IO[bytes], ending: str) -> None:
+    """Write a figure; the same one has the same bytes."""
+    import matplotlib as mpl
+
+    metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+    figure = drawn.get_figure(root=True)
+    assert figure is not None
+    with mpl.rc_context({"svg.hashsalt": "drillctrl"}):
+        figure.savefig(stream, format=ending[1:], dpi=150, metadata=metadata.get(ending))
+
+
 def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
     """Write a figure, or that of some Axes, by the file's ending, whole or not at all.
 
@@ -62,15 +106,8 @@ def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
         If the ending is none of .pdf, .png, .svg.
     """
     check_figure_path(path)
-    metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-    ending = Path(path).suffix.lower()
-    figure = drawn.get_figure(root=True)
-    assert figure is not None
     with replacing(path) as file:
-        import matplotlib as mpl
-
-        with mpl.rc_context({"svg.hashsalt": "drillctrl"}):
-            figure.savefig(file, format=ending[1:], dpi=150, metadata=metadata.get(ending))
+        _write(drawn, file, Path(path).suffix.lower())
 
 
 def check_figure_path(path: str | Path) -> None:

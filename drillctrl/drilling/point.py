@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from drillctrl.base.errors import InputError, checked_integer, checked_number, takes
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.drilling.rig import Rig
 
 # Wear-flat groups of Table 1, used where a dimensionless point leaves them open.
@@ -102,6 +102,8 @@ class RigPoint:
     penetration_rate : float
         V0 ≥ 0, m/s.
     """
+
+    made_by = "RigPoint(table1(), speed, rate), in rad/s and m/s"
 
     rig: Rig
     rotary_speed: float
@@ -212,7 +214,3 @@ def changed_by(
             penetration_rate=where.penetration_rate * rate,
         )
     return where.with_changes(omega0=where.omega0 * speed, delta0=where.delta0 * rate / speed)
-
-
-# What works in the units of a rig.
-takes_rig_point = takes(RigPoint, "a RigPoint: a rig, its speed and rate of penetration")

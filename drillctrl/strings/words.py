@@ -55,6 +55,9 @@ def _top_end(rig: StringRig) -> str:
     turned = "speed imposed" if rig.drive is None else drive_text(rig.drive)
     ropes = rig.string.hoisting_stiffness
     fed = "feed imposed" if ropes is None else f"ropes of {ropes / 1e3:.5g} kN/m"
+    if rig.weight_control is not None:
+        gain = rig.weight_control.feed_gain * 3.6e6
+        fed = f"fed by weight, {gain:.3g} m/h per kN"
     return f"{turned}, {fed}"
 
 

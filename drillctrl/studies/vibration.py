@@ -16,6 +16,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.files import write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress
 from drillctrl.charts.chart import chart
@@ -118,6 +119,7 @@ def check_map_path(path: str | Path) -> None:
         raise InputError("path", str(path), "a name that ends in .csv or .json")
 
 
+@checks_kinds
 def vibration_map(
     point: Where,
     x: AxisLike = ("omega0", 4.0, 24.0),

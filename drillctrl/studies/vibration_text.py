@@ -9,6 +9,7 @@ from drillctrl.charts.axes import Axis
 from drillctrl.charts.plane import held_text
 from drillctrl.drilling.gain_units import control_text
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.starts import start_named
 from drillctrl.simulation.status import OUTCOME_NAMED
 from drillctrl.studies.vibration_figure import OUTCOMES
 from drillctrl.studies.vibration_values import MapValues, Severity
@@ -18,7 +19,10 @@ def place_text(found: MapValues, name: str | None = None) -> str:
     """Say which rig, rock and starts a map is of; what is an axis is left out."""
     held = held_text(found.plane)
     parts = [text for text in (name, held) if text]
-    return f"{', '.join(parts)}; worst of the starts {', '.join(found.starts)}"
+    worst = f"worst of the starts {', '.join(found.starts)}"
+    if len(found.starts) == 1:
+        worst = f"after {start_named(found.starts[0]).text}"
+    return f"{', '.join(parts)}; {worst}"
 
 
 def controller_text(found: MapValues) -> str:
