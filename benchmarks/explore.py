@@ -74,7 +74,7 @@ def click_somewhere(page: Page, draw: random.Random) -> None:
     elif kind == "rig":
         page.select_option("#rig", draw.choice(["", "table1", "table1", "table1"]))
     elif kind == "details":
-        found = page.locator("details summary")
+        found = page.locator("details summary:visible")
         found.nth(draw.randrange(found.count())).click()
     elif kind == "text":
         page.evaluate("document.querySelector('#paste').open = true")
@@ -96,6 +96,43 @@ def heap(session: Any) -> tuple[float, int]:
     return used, session.send("Memory.getDOMCounters")["nodes"]
 
 
+def clicked(address: str, pid: int, draw: random.Random, seconds: float, began: float) -> list[str]:
+    """Click for so long; return what was said on the console, and what failed."""
+    heard: list[str] = []
+    with sync_playwright() as driver:
+        path = shutil.which("chromium")
+        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.on("console", lambda message: heard.append(message.text))
+        page.on("pageerror", lambda error: heard.append(str(error)))
+        page.goto(address)
+        for drawn in ("#panel-motion svg", ".handle"):
+            page.wait_for_selector(drawn, timeout=120_000)
+        print(f"first pictures after {time.perf_counter() - began:.2f} s")
+        session = page.context.new_cdp_session(page)
+        waits = sorted(w for _ in range(40) if (w := page.evaluate(FOLLOWED)) is not None)
+        print(f"a step of the point is answered in {median(waits):.0f} ms, 9 of 10 in "
+              f"{waits[int(0.9 * len(waits))]:.0f} ms")  # fmt: skip
+        page.set_default_timeout(5000)
+        clicks, missed, told = 0, 0, time.monotonic()
+        ends = told + seconds
+        while time.monotonic() < ends:
+            try:
+                click_somewhere(page, draw)
+            except Error:
+                # What was to be clicked went away, as a button does when its work is done.
+                missed += 1
+            clicks += 1
+            page.wait_for_timeout(draw.randint(20, 300))
+            if time.monotonic() - told > 30.0:
+                told = time.monotonic()
+                used, nodes = heap(session)
+                own = f"server {resident(pid):.0f} MB, page {used:.1f} MB, {nodes} nodes"
+                print(f"{clicks} clicks, {missed} missed: {own}, {len(heard)} errors", flush=True)
+        browser.close()
+    return heard
+
+
 def main() -> None:
     """Click, and print every half minute."""
     parser = argparse.ArgumentParser()
@@ -111,38 +148,12 @@ def main() -> None:
     assert server.stdout is not None
     address = server.stdout.readline().strip()
     print(f"address after {time.perf_counter() - began:.2f} s")
-    heard: list[str] = []
-    with sync_playwright() as driver:
-        path = shutil.which("chromium")
-        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1400, "height": 900})
-        page.on("console", lambda message: heard.append(message.text))
-        page.on("pageerror", lambda error: heard.append(str(error)))
-        page.goto(address)
-        page.wait_for_selector("#panel-motion svg", timeout=120_000)
-        print(f"first pictures after {time.perf_counter() - began:.2f} s")
-        session = page.context.new_cdp_session(page)
-        waits = sorted(w for _ in range(40) if (w := page.evaluate(FOLLOWED)) is not None)
-        print(f"a step of the point is answered in {median(waits):.0f} ms, 9 of 10 in "
-              f"{waits[int(0.9 * len(waits))]:.0f} ms")  # fmt: skip
-        clicks, told = 0, time.monotonic()
-        ends = told + given.seconds
-        while time.monotonic() < ends:
-            try:
-                click_somewhere(page, draw)
-            except Error as error:
-                heard.append(str(error).splitlines()[0])
-            clicks += 1
-            page.wait_for_timeout(draw.randint(20, 300))
-            if time.monotonic() - told > 30.0:
-                told = time.monotonic()
-                used, nodes = heap(session)
-                own = f"server {resident(server.pid):.0f} MB, page {used:.1f} MB, {nodes} nodes"
-                print(f"{clicks} clicks: {own}, {len(heard)} errors", flush=True)
-        browser.close()
+    try:
+        heard = clicked(address, server.pid, draw, given.seconds, began)
+    finally:
+        server.send_signal(signal.SIGINT)
     for line in sorted(set(heard)):
         print(f"  {line} ({heard.count(line)})")
-    server.send_signal(signal.SIGINT)
     print(f"ended with {server.wait(60)}")
 
 

@@ -5,6 +5,7 @@ const state = { rig: null, structure: null, speed: 120, rop: 20, rock_strength: 
   omega0: 10, delta0: 1.75, psi: 14, eta: 1.6, xi: 0.02, kappa: 0.02 };
 const opened = new Map();          // rigs that this window opened, by name
 const moved = new Map();           // gains that were moved, by rig and structure
+let started = false;
 let known = null;                  // what the server says of the rig
 let axes = { x: [30, 240], y: [0, 50] };
 let chartPlot = null, lastChart = null, free = null, freeFor = "", lastPoint = "";
@@ -36,6 +37,8 @@ function question(without) {
 
 // A slider with a box for the number itself.
 function slider(id, text, low, high, step, value, changed) {
+  const short6 = v => Number(v.toPrecision(6));
+  value = short6(value);
   const range = element("input", { type: "range", id: `${id}-range`, min: low, max: high, step: "any", value, "aria-label": `${text}, slider` });
   const box = element("input", { type: "number", id, min: low, step: "any", value });
   const set = (to, from) => {
@@ -143,9 +146,18 @@ async function chooseRig(rig) {
   if (found.complaints.length) { complain(found.complaints, rig); return false; }
   known = found;
   if (rig && rig.text !== null) { opened.set(rig.name, rig.text); byId("text").value = rig.text; }
-  if (JSON.stringify(before) !== JSON.stringify(rig)) state.rock_strength = null;
+  if (JSON.stringify(before) !== JSON.stringify(rig)) {
+    state.rock_strength = null;
+    byId("verdict").textContent = "Working …";
+    byId("verdict").className = "";
+    for (const one of Object.values(follow)) one.renew();
+    for (const job of [runMotion, runMap, runStrings, runFind]) if (job.stop) job.stop.abort();
+    chartPlot = chartHeld = null;
+    lastPoint = "";
+  }
   state.rig = rig;
-  if (onRig() !== (before !== null) || chartPlot === null) axes = usualAxes();
+  if (onRig() !== (before !== null) || !started) axes = usualAxes();
+  started = true;
   byId("notes").replaceChildren(...known.notes.map(note => element("li", {}, note)));
   buildRigs();
   buildStructures();
@@ -306,7 +318,7 @@ function drawRoots(result) {
   });
 }
 
-panels.nyquist = new Panel("nyquist", "Nyquist: the loop broken at the drive of the torque");
+panels.nyquist = new Panel("nyquist", "Nyquist: how near the loop passes to −1");
 function drawNyquist(result) {
   const near = 3;
   const axis = (values, min, max) => ({
@@ -371,13 +383,14 @@ const mapJob = jobControls("map", "Draw the map", mapAcross.label, mapUp.label);
 panels.map = new Panel("map", "How hard the bit vibrates: runs over the chart", mapJob.box);
 const OUTCOMES = { settles: ["#7fb98f", ""], orbit: ["#e8cf6a", "~"], bounces: ["#e0a04e", "B"], "stick-slip": ["#d9694a", "S"], "does-not-keep-up": ["#a06fa8", "L"], stalls: ["#7d5a8c", "0"], "turns-back": ["#9c6b5a", "<"], diverges: ["#8c8c8c", "!"], undecided: ["#dddddd", "?"], chaotic: ["#c9802e", "C"] };
 function drawMap(result) {
-  const [across, up] = result.counts, labels = axisLabels(), shownAxes = [axes.x, axes.y];
-  const [low, high] = [0, 1].map(k => result.points.map(p => p[k])).map(v => [Math.min(...v), Math.max(...v)]);
-  const half = [(low[1] - low[0]) / (across - 1) / 2, (high[1] - high[0]) / (up - 1) / 2];
+  const labels = axisLabels(), ends = [0, 1].map(k => result.points.map(p => p[k])).map(v => [Math.min(...v), Math.max(...v)]);
+  const half = ends.map((v, k) => (v[1] - v[0]) / (result.counts[k] - 1) / 2);
+  const edges = result.data.boundaries.controlled || result.data.boundaries.uncontrolled || [];
   const seen = [...new Set(result.outcomes)];
   drawPlot(panels.map.picture, {
-    id: "map", label: "Outcome of runs over the chart", x: { ...labels.x, min: low[0] - half[0], max: low[1] + half[0] },
-    y: { ...labels.y, min: high[0] - half[1], max: high[1] + half[1] },
+    id: "map", label: "Outcome of runs over the chart", x: { ...labels.x, min: ends[0][0] - half[0], max: ends[0][1] + half[0] },
+    y: { ...labels.y, min: ends[1][0] - half[1], max: ends[1][1] + half[1] },
+    series: edges.map((curve, k) => ({ name: k ? "" : "edge by linear theory", x: curve.map(p => p[0]), y: curve.map(p => p[1]), colour: "#1a1a1a" })),
     cells: result.points.map((p, k) => ({
       x0: p[0] - half[0], x1: p[0] + half[0], y0: p[1] - half[1], y1: p[1] + half[1], colour: (OUTCOMES[result.outcomes[k]] || OUTCOMES.undecided)[0],
       mark: (OUTCOMES[result.outcomes[k]] || OUTCOMES.undecided)[1],
@@ -390,8 +403,15 @@ function drawMap(result) {
   panels.map.show(result, columnsOf({ name: names()[0], values: result.points.map(p => p[0]) }, { name: names()[1], values: result.points.map(p => p[1]) }, { outcome: result.outcomes, swing: result.swing }));
 }
 const runMap = new Job(panels.map, "map", mapJob.go, mapJob.cancel, mapJob.bar);
-mapJob.go.addEventListener("click", () =>
-  runMap.run({ ...axes, counts: [Number(mapAcross.input.value), Number(mapUp.input.value)] }, drawMap));
+// Points lie in the middle of cells that cover the chart.
+function inset([low, high], count) {
+  const half = (high - low) / count / 2;
+  return [low + half, high - half].map(v => Number(v.toPrecision(5)));
+}
+mapJob.go.addEventListener("click", () => {
+  const counts = [Number(mapAcross.input.value), Number(mapUp.input.value)];
+  runMap.run({ x: inset(axes.x, counts[0] || 1), y: inset(axes.y, counts[1] || 1), counts }, drawMap);
+});
 
 const rigList = element("div", { class: "controls", role: "group", "aria-label": "Rigs to put side by side" });
 const withBoundary = element("input", { type: "checkbox", id: "strings-boundary" });
@@ -459,7 +479,7 @@ function drawnStrings(rows) {
     }
     make("text", { x: middle, y: 14, "text-anchor": "middle" }, svg, row.name);
   });
-  make("text", { x: LEFT, y: height - 8, fill: "#595959", "font-size": 12 }, svg, "diameters drawn far wider than lengths; light: pipe, middle: heavy-weight, dark: collars");
+  make("text", { x: LEFT, y: height - 8, fill: "#595959", "font-size": 12 }, svg, "light: pipe, middle: heavy-weight, dark: collars; widths enlarged");
   return box;
 }
 const runStrings = new Job(panels.strings, "strings", stringsJob.go, stringsJob.cancel, stringsJob.bar);

@@ -91,7 +91,12 @@ class Panel {
 // A panel that follows the hand: one question at a time, and then the newest.
 class Follower {
   constructor(panel, view, options, draw) {
-    Object.assign(this, { panel, view, options, draw, running: false, again: false });
+    Object.assign(this, { panel, view, options, draw, running: false, again: false, stop: null });
+  }
+  // What is shown is of another rig now, and so is what is being worked out.
+  renew() {
+    this.panel.clear("");
+    if (this.stop) this.stop.abort();
   }
   poke() {
     if (this.running) { this.again = true; return; }
@@ -102,15 +107,14 @@ class Follower {
     const late = setTimeout(() => this.panel.busy("working …"), 150);
     do {
       this.again = false;
-      const options = this.options();
-      if (options === null) continue;
+      this.stop = new AbortController();
+      const own = this.stop, began = performance.now();
       try {
-        const began = performance.now();
-        const result = await ask(this.view, question(), options);
-        this.took = performance.now() - began;
-        if (!this.again || this.took < 400) this.draw(result);
+        const result = await ask(this.view, question(), this.options(), own.signal);
+        // Of a slow answer only the newest is worth drawing.
+        if (!own.signal.aborted && (!this.again || performance.now() - began < 400)) this.draw(result);
       } catch (error) {
-        if (!this.again) this.panel.clear(told(error), true);
+        if (!this.again && !own.signal.aborted) this.panel.clear(told(error), true);
       }
     } while (this.again);
     clearTimeout(late);
