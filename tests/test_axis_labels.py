@@ -201,10 +201,10 @@ def test_of_comparisons_and_bits(where):
     for along, named in (("speed", "rpm"), ("rate", "m/h")):
         drawn = plot_damping_along(
             *(100.0 * amplitudes, amplitudes, amplitudes, [("above", 20.0)]),
-            along=along, with_rig=of_rig, label="mode 1",
+            along=along, units=(named if of_rig else "", unit), label="mode 1",
         )  # fmt: skip
         check(drawn, *((named, "N·m·s/rad") if of_rig else ()))
-    check(plot_response(*answer, amplitudes, answer, of_rig, "swing 0.03"), *units)
+    check(plot_response(*answer, amplitudes, answer, unit, "swing 0.03"), *units)
 
 
 def test_of_strings():

@@ -110,7 +110,7 @@ class Analysis(AnalysisValues):
         if self.structure is not None:
             loops[f"with {self.structure.name}"] = self.system()
         place = ", ".join(text for text in (name, self.case.place) if text)
-        return plot_roots(loops, self.loop.dominant_roots, place, self.case.rig, ax)
+        return plot_roots(loops, self.loop.dominant_roots, place, self.case.told_rig, ax)
 
 
 class Design(DesignValues, Analysis):

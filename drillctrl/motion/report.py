@@ -19,7 +19,7 @@ from drillctrl.spectrum.roots import spectral_abscissa
 
 
 class Units(NamedTuple):
-    """SI values of dimensionless units; 1 where there is no rig.
+    """What dimensionless units are in those that are told; 1 where there is no rig.
 
     ``turn`` is what an angular frequency is divided by to be told: in Hz of a rig.
     """
@@ -31,15 +31,33 @@ class Units(NamedTuple):
     turn: float
     response_name: str
     rate_name: str
+    weight_name: str = ""
+    torque_name: str = ""
 
 
 def units_of(case: Case) -> Units:
-    """Return the units in which a case is told."""
+    """Return the units of the fields of a case: SI where there is a rig."""
     if case.rig is None:
         return Units(1.0, 1.0, 1.0, 1.0, 1.0, "", "")
     weight, torque, time = (si_scale(name, case.rig) for name in ("force", "torque", "time"))
     turn = 2.0 * math.pi * time
-    return Units(torque * time, time, weight, torque, turn, "N·m·s/rad", "1/s")
+    return Units(torque * time, time, weight, torque, turn, "N·m·s/rad", "1/s", "N", "N·m")
+
+
+def told_units(case: Case) -> Units:
+    """Return the units in which people are told of a case."""
+    language = case.language
+    if not language.units:
+        return Units(1.0, 1.0, 1.0, 1.0, 1.0, "", "")
+    si = units_of(case)
+    return si._replace(
+        response=language.number("impedance", si.response),
+        weight=language.number("force", si.weight),
+        torque=language.number("torque", si.torque),
+        response_name=language.unit("impedance"),
+        weight_name=language.unit("force"),
+        torque_name=language.unit("torque"),
+    )
 
 
 def motion_fields(
@@ -164,7 +182,7 @@ def _number(value: float) -> float | None:
 
 def motion_summary(found: DrillingMotion) -> str:
     """Return what is told on a terminal."""
-    units = units_of(found.case)
+    units = told_units(found.case)
     lines = [_orbit_text(found.orbit, units)]
     for swing in found.modes:
         lines += ["", *_mode_lines(swing, units)]
@@ -192,7 +210,7 @@ def _orbit_told(orbit: AxialOrbit, units: Units) -> str:
     loads = ""
     if units.rate_name:
         weight, torque = orbit.weight * units.weight, orbit.torque * units.torque
-        loads = f" ({weight / 1e3:.3g} kN, {torque / 1e3:.3g} kN·m)"
+        loads = f" ({weight:.3g} {units.weight_name}, {torque:.3g} {units.torque_name})"
     return (
         f"Axial orbit at steady rotation: {kind}; held {orbit.held:.0%} of the time, off the rock "
         f"{orbit.lifted:.0%}; cuts up to {orbit.deepest:.2f} of smooth drilling; mean weight "
@@ -297,7 +315,8 @@ def _along_unit(found: ModeAlong) -> str:
 
 def along_summary(found: ModeAlong) -> str:
     """Return what is told on a terminal of a mode over speed or rate."""
-    units, unit, own = units_of(found.case), _along_unit(found), found.own_value
+    units, (factor, unit) = told_units(found.case), found.told
+    own = found.own_value * factor
     name = unit or {"speed": "ω0", "rate": "V0"}[found.along]
     held = {"speed": "the rate of penetration held", "rate": "the rotary speed held"}[found.along]
     amplitude = statistics.median(each.amplitude for each in found.at)
@@ -305,7 +324,7 @@ def along_summary(found: ModeAlong) -> str:
         f"Torsional mode {found.number} at a swing of {amplitude:.2g}, {held}",
         f"{name:>9} {'damping left':>13} {'growth':>9} {'±':>8}",
     ]
-    for value, left, each in zip(found.values, found.damping_left, found.at, strict=True):
+    for value, left, each in zip(factor * found.values, found.damping_left, found.at, strict=True):
         if not math.isfinite(each.error):
             broken = each.response.broken
             told = "the bit swings of itself" if broken is None else broken.sentence
@@ -320,7 +339,9 @@ def along_summary(found: ModeAlong) -> str:
         sure = {each.sign for each in found.at} - {0}
         verb = "Decays" if sure == {-1} else "Grows"
         lines.append(f"{verb} wherever it is sure." if sure else "It is sure nowhere.")
-    unsure = [value for value, each in zip(found.values, found.at, strict=True) if not each.sign]
+    unsure = [
+        value for value, each in zip(factor * found.values, found.at, strict=True) if not each.sign
+    ]
     if unsure:
         listed = ", ".join(f"{value:.4g}" for value in unsure)
         lines.append(f"Not sure at {listed} {unit}: the simulator must decide there.")
@@ -359,7 +380,7 @@ def band_fields(found: BitBand) -> dict[str, Any]:
 
 def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
     """Return what is told of H at frequencies of one's own on a terminal."""
-    units = units_of(found.case)
+    units = told_units(found.case)
     rig = bool(units.rate_name)
     lines = [
         _orbit_text(found.orbit, units),
@@ -381,7 +402,7 @@ def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -
 
 def band_summary(found: BitBand) -> str:
     """Return what is told of a band on a terminal."""
-    units, model = units_of(found.case), found.rational()
+    units, model = told_units(found.case), found.rational()
     rig = bool(units.rate_name)
     amplitude = sum(each.amplitude for each in found.responses) / len(found.responses)
     unit = f", {units.response_name}" if rig else ""

@@ -75,10 +75,11 @@ def _of_drive(found: ReportValues) -> list[str]:
         ]
     if not found.recommended:
         return [f"Do not use {law.control.name} here: in the run the bit did worse with it."]
-    settings = ", ".join(
-        f"{name} to {value}" for name, value in drive_settings(law, found.language)
-    )
-    told = [f"Set {settings} ({law.control.name}) of the drive."]
+    rows = drive_settings(law, found.language)
+    settings = ", ".join(f"{name} to {value}" for name, value in rows)
+    told = [f"Set {settings} of the drive ({law.control.name})."]
+    if rows[0][0] not in ("P", "I"):
+        told = [f"Run the drive under {law.control.name}, with the law written out below."]
     if law is not stiff:
         first = law.modes[0]
         hertz = found.language.text("frequency", first.slope.mode_frequency, 3)
@@ -131,9 +132,9 @@ def _at_bit(found: ReportValues) -> list[str]:
             speed = found.language.text("angular_rate", change.value * found.point.rotary_speed)
             told.append(f"At {speed} and the same {rate} the bit keeps turning from every start.")
     if found.recommended:
-        told.append(
-            "Or control the torque at the bit with the settings below: " + _good(design) + "."
-        )
+        rows = gain_settings(design, found.language)
+        settings = ", ".join(f"{name.partition(',')[0]} {value}" for name, value in rows)
+        told.append(f"Or control the torque at the bit, {settings}: {_good(design)}.")
     else:
         told.append("No control is offered: " + _why_not(found, design) + ".")
     return told
@@ -154,7 +155,7 @@ def drive_settings(drive: DriveMeasures, language: Language) -> Rows:
     control = drive.control
     integral, rest = without_integral(control.speed)
     if control.torque or len(rest.denominator) > 1 or len(rest.numerator) > 2:
-        return [("law", law_text(control))]
+        return [("law, SI units", law_text(control))]
     gains = [part / rest.denominator[0] for part in rest.numerator]
     rows = [
         ("P", language.text("drive_impedance", gains[-1], 3)),
