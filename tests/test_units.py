@@ -17,6 +17,7 @@ from drillctrl import (
     analyze,
     chart,
     cli,
+    load_rig,
     simulate,
     table1,
     torsional_modes,
@@ -131,6 +132,30 @@ def test_the_answer_of_a_bit_is_told_in_the_units_asked_for():
     damping = torsional_modes(SI, 1)[0].damping * SI.rig.torsional_stiffness * SI.rig.time_scale
     in_feet = damping / (0.3048 * 4.4482216152605)
     assert f"own damping {in_feet:.4g} ft·lbf·s/rad" in told
+
+
+def test_a_string_and_its_drive_are_told_in_feet():
+    told = invoke("rig", "check", "vertical-3000", "--units", "field").stdout
+    assert "9842.52 ft" in told
+    assert "12.25 in" in told
+    assert not re.search(r"\d (?:mm|m|kN|t|kg/m|kg/m³|N·m/rad|MPa)\b", told)
+    drive = invoke("compare", "--rig", "vertical-3000", "--structures", "stiff", "--units", "field")
+    pipe = load_rig("vertical-3000").string.torsion.wave_impedance
+    assert f"{pipe / (0.3048 * 4.4482216152605):.4g} ft·lbf·s" in drive.stdout
+
+
+def test_bare_numbers_on_an_axis_are_in_the_units_told(tmp_path):
+    told = [
+        json.loads(invoke("chart", "--rig", "table1", "--x", "speed=140:160", "--y", y, "--json",
+                          "--units", units).stdout)
+        for y, units in (("rop=20:40", "field"), ("rop=20:40 ft/h", "si"))
+    ]  # fmt: skip
+    areas = [
+        t["stable_area"] / (t["y"]["high"] - t["y"]["low"]) for t in (f["axes"] | f for f in told)
+    ]
+    assert areas[0] == pytest.approx(areas[1], rel=1e-3)
+    points = [fields["operating_point"]["delta0"] for fields in told]
+    assert points[0] == pytest.approx(points[1])
 
 
 @pytest.mark.parametrize(

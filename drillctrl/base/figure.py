@@ -6,7 +6,7 @@ import base64
 import io
 import textwrap
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
@@ -103,13 +103,13 @@ def _write(drawn: Figure | Axes, stream: IO[bytes], ending: str, style: str = "s
     metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     figure = drawn.get_figure(root=True)
     assert figure is not None
-    words = {"svg.hashsalt": "drillctrl"}
+    words: dict[str, Any] = {"svg.hashsalt": "drillctrl"}
     dots = 150
     if style == "journal":
         # Texts as texts, in fonts that publishers take.
         words |= {"svg.fonttype": "none", "pdf.fonttype": 42}
         dots = 600
-    with mpl.rc_context(words):
+    with mpl.rc_context(words):  # type: ignore[arg-type, unused-ignore]
         figure.savefig(stream, format=ending[1:], dpi=dots, metadata=metadata.get(ending))
 
 

@@ -149,3 +149,17 @@ def language_named(name: str | None, *, with_rig: bool) -> Language:
         wanted = "dimensionless, or given with --rig: a point without a rig has no units"
         raise InputError("units", name, wanted)
     return found
+
+
+def told_language(units: str | None) -> Language:
+    """Return a language with units, SI without a name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or it has none.
+    """
+    found = language_named(units, with_rig=True)
+    if found is DIMENSIONLESS:
+        raise InputError("units", found.name, "si or field: without a point there is no scale")
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,10 +22,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
-_BEARS = ("rig", "structures", "as_json", "out", *_ALONE)
+_BEARS = ("rig", "units", "structures", "as_json", "out", *_ALONE)
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
 _TABLE_BEARS = ("rig", "depth", "structure", "require_stable", "as_json", "out", "plot")
-_DESIGN_BEARS = (*_POINT, "structure", "require_stable", "as_json", "out", "plot")
+_DESIGN_BEARS = (*_POINT, "units", "structure", "require_stable", "as_json", "out", "plot")
 
 
 def drive_options(command: Command) -> Command:
@@ -108,7 +109,9 @@ def deliver_drive_design(
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
     error = point.get("depth_error")
     found = design_drive(where, structure, length_error=0.2 if error is None else error)
-    deliver(found.to_dict(), found.summary, found.plot, as_json=as_json, out=out, plot=plot)
+    units = point.get("units") or "si"
+    text = functools.partial(found.summary, units)
+    deliver(found.to_dict(), text, found.plot, as_json=as_json, out=out, plot=plot)
     return found.stable
 
 
@@ -212,4 +215,4 @@ def deliver_drives(
     _write(found, out)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot())
-    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+    click.echo(json_text(found.to_dict()) if as_json else found.summary(point.get("units") or "si"))

@@ -57,7 +57,7 @@ def point_options(command: Command) -> Command:
             "--units",
             metavar="NAME",
             help="Results in si (m/h, kN: usual with a rig), field (ft/h, klbf) or dimensionless; "
-            "JSON stays as it is, in SI or dimensionless.",
+            "JSON stays in SI or dimensionless but for axes.",
         ),
     ]
     return with_options(command, options)

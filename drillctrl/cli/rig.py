@@ -21,8 +21,9 @@ def rig_command() -> None:
 @rig_command.command(name="check", cls=Verb)
 @click.argument("source", metavar="FILE|PRESET")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--units", metavar="NAME", help="In si (default) or field: ft, in, klbf …")
 @click.option("--plot", type=click.Path(), help="Draw string and modes: FILE.png, .svg, .pdf.")
-def check_command(source: str, as_json: bool, plot: str | None) -> None:
+def check_command(source: str, as_json: bool, units: str | None, plot: str | None) -> None:
     """Say what is understood of a rig file: string, weights, lumped numbers, modes.
 
     \b
@@ -31,13 +32,15 @@ def check_command(source: str, as_json: bool, plot: str | None) -> None:
       drillctrl rig check vertical-3000 --plot string.png
     """
     check_figure(plot)
+    from drillctrl.base.language import told_language
     from drillctrl.strings.check import check_rig
     from drillctrl.strings.files import load_rig
     from drillctrl.strings.words import rig_summary
 
+    language = told_language(units)
     found = check_rig(load_rig(source))
     if plot is not None:
         from drillctrl.strings.figure import plot_rig
 
-        write_figure(plot, plot_rig(found))
-    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found))
+        write_figure(plot, plot_rig(found, language))
+    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found, language))

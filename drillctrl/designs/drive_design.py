@@ -7,6 +7,8 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.language import told_language
+from drillctrl.base.text import wrapped
 from drillctrl.designs.design import analyze
 from drillctrl.designs.result import Analysis
 from drillctrl.drilling.case import as_case
@@ -15,7 +17,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
-from drillctrl.strings.drives_words import law_text
+from drillctrl.strings.drives_words import law_text, setting_sentence
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.strings.rig import StringRig
@@ -81,13 +83,13 @@ class DriveDesign:
             "elapsed_seconds": self.elapsed_seconds,
         }
 
-    def summary(self) -> str:
-        """Return a text for people."""
+    def summary(self, units: str = "si") -> str:
+        """Return a text for people, in the units of ``"si"`` or ``"field"``."""
         lines = [
-            f"Top drive under {self.drive.control.name}",
-            f"  Law: {law_text(self.drive.control)}",
+            wrapped(setting_sentence(self.drive.control, told_language(units))),
+            wrapped(f"Law in SI units: {law_text(self.drive.control)}"),
             "",
-            self.found.summary(),
+            self.found.summary(units),
         ]
         if self.drilling is not None:
             said = self.drilling

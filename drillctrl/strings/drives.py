@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
@@ -77,9 +78,10 @@ class DriveComparison:
         ]
         return csv_text(list(rows[0]), ([str(v) for v in row.values()] for row in rows))
 
-    def summary(self) -> str:
-        """Return a table for people."""
-        return comparison_summary(self.rig, self.falling, self.drives)
+    def summary(self, units: str = "si") -> str:
+        """Return a table for people, in the units of ``"si"`` or ``"field"``."""
+        language = told_language(units)
+        return comparison_summary(self.rig, self.falling, self.drives, language)
 
     def plot(self) -> Figure:
         """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`."""

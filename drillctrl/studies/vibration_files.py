@@ -82,13 +82,13 @@ def _netcdf(found: MapValues) -> bytes:
             about = {"units": "1", "long_name": words}
             variables[f"{prefix}{name}"] = ((y.name, x.name), field.T, about)
         ranks = fill(found.shape, found.cells, found.nodes, _ranks(severity))
-        about = {
+        flags: dict[str, Any] = {
             "flag_values": np.arange(len(Outcome), dtype="int8"),
             "flag_meanings": " ".join(sorted(OUTCOME_NAMED, key=_rank)),
             "long_name": "what becomes of the bit",
         }
         whole = np.rint(ranks.T).astype("int8")
-        variables[f"{prefix}outcome"] = ((y.name, x.name), whole, about)
+        variables[f"{prefix}outcome"] = ((y.name, x.name), whole, flags)
     attributes = {
         "Conventions": "CF-1.8",
         "title": "drillctrl vibration map",
