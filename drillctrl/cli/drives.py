@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
-from drillctrl.cli.point import read_point
+from drillctrl.cli.point import read_point, rig_name
 
 if TYPE_CHECKING:
     from drillctrl.strings.drive_table import DriveTable
@@ -111,7 +111,8 @@ def deliver_drive_design(
     found = design_drive(where, structure, length_error=0.2 if error is None else error)
     units = point.get("units") or "si"
     text = functools.partial(found.summary, units)
-    deliver(found.to_dict(), text, found.plot, as_json=as_json, out=out, plot=plot)
+    draw = functools.partial(found.plot, rig_name(point))
+    deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
     return found.stable
 
 
@@ -214,5 +215,5 @@ def deliver_drives(
     found = compare_drives(load_rig(point["rig"]), names, FallingTorque(**falling))
     _write(found, out)
     if given["plot"] is not None:
-        write_figure(given["plot"], found.plot())
+        write_figure(given["plot"], found.plot(rig_name(point)))
     click.echo(json_text(found.to_dict()) if as_json else found.summary(point.get("units") or "si"))

@@ -46,9 +46,11 @@ def report_command(
 
     \b
     Examples:
-      drillctrl report --rig table1 --speed "120 rpm" --rop "20 m/h" --out report.html
-      drillctrl report --rig paper-string --speed "120 rpm" --rop "20 m/h" --no-map \\
-          --date 2026-11-29 --out report.html
+      drillctrl report --rig table1 --speed "150 rpm" --rop "20 m/h" --no-map --out report.html
+      drillctrl report --rig table1 --speed "150 rpm" --rop "65 ft/h" --structure p --no-map \\
+          --units field --date 2026-11-29 --out report.html
+
+    Without --no-map, and for long strings, it takes up to a minute.
     """
     check_folder("--out", out)
     from drillctrl.base.errors import checked_integer

@@ -108,9 +108,9 @@ class DriveDesign:
             return f"all vibration dies away, {hertz:.3g} Hz slowest, by {-rate:.3g} 1/s"
         return f"vibration GROWS, {hertz:.3g} Hz fastest, by {rate:.3g} 1/s"
 
-    def plot(self) -> Figure:
-        """Draw ``|r|``, impedance, and damping over frequency."""
-        return self.found.plot()
+    def plot(self, name: str | None = None) -> Figure:
+        """Draw ``|r|``, impedance, and damping over frequency, under the name of the rig."""
+        return self.found.plot(name)
 
 
 def design_drive(

@@ -83,15 +83,23 @@ class DriveComparison:
         language = told_language(units)
         return comparison_summary(self.rig, self.falling, self.drives, language)
 
-    def plot(self) -> Figure:
-        """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`."""
+    def plot(self, name: str | None = None) -> Figure:
+        """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the rig, for the title.
+        """
         from drillctrl.strings.drives_figure import plot_drives
 
         curves = {
             drive.control.name: (drive.frequencies, drive.reflection, drive.impedance, drive.roots)
             for drive in self.drives
         }
-        return plot_drives(curves, self.rig.string.torsion.wave_impedance)
+        length = f"{self.rig.string.length:.6g} m of string, free bit"
+        title = length if name is None else f"{name}, {length}"
+        return plot_drives(curves, self.rig.string.torsion.wave_impedance, title)
 
 
 def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> DriveControl:
