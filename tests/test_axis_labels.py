@@ -35,6 +35,7 @@ from drillctrl import (
     table1,
     vibration_map,
 )
+from drillctrl.base.language import FIELD
 from drillctrl.motion.figure import plot_damping, plot_damping_along, plot_response
 from drillctrl.simulation.figure import (
     plot_against_linear,
@@ -43,6 +44,7 @@ from drillctrl.simulation.figure import (
     plot_signal,
 )
 from drillctrl.strings.figure import plot_rig
+from drillctrl.studies.rig_report_figure import Line, plot_courses, plot_thresholds
 
 OF_RIGS = (
     "rpm",
@@ -218,16 +220,30 @@ def test_of_comparisons_and_bits(where):
     for along, named in (("speed", "rpm"), ("rate", "m/h")):
         drawn = plot_damping_along(
             *(100.0 * amplitudes, amplitudes, amplitudes, [("above", 20.0)]),
-            along=along, with_rig=of_rig, label="mode 1",
+            along=along, units=(named if of_rig else "", unit), label="mode 1",
         )  # fmt: skip
         check(drawn, *((named, "N·m·s/rad") if of_rig else ()))
-    check(plot_response(*answer, amplitudes, answer, of_rig, "swing 0.03"), *units)
+    check(plot_response(*answer, amplitudes, answer, unit, "swing 0.03"), *units)
 
 
 def test_of_strings():
     rig = load_rig("vertical-3000")
     check(plot_rig(check_rig(rig)), "m", "mm")
-    check(compare_drives(rig, ["stiff"]).plot(), "Hz")
+    drawn = compare_drives(rig, ["stiff"]).plot("my rig")
+    check(drawn, "Hz")
+    assert drawn.get_suptitle().startswith("my rig, 3000 m of string")
+
+
+def test_of_a_report():
+    times = np.linspace(0.0, 1.0, 5)
+    drawn = plot_courses([Line("stiff", times, 12.0 + times, 1e3 * times)], 12.0, FIELD)
+    assert {"time, s", "bit speed, rpm"} <= set(labels(drawn))
+    assert "torque of control, kft·lbf" in labels(drawn)
+    assert "fall of the bit's torque, kft·lbf" in labels(
+        plot_thresholds({"stiff": 50.0}, 5.0, 2e3, 12.0, FIELD)
+    )
+    found = labels(plot_rig(check_rig(load_rig("paper-string")), FIELD))
+    assert {"depth along the string, ft", "radius, in"} <= set(found)
 
 
 def test_of_records():

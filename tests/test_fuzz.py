@@ -84,6 +84,7 @@ WORK = (
     "motion.band.bit_band",
     "studies.compare.compare",
     "studies.vibration.vibration_map",
+    "studies.rig_report.rig_report",
     "paper.reproduce.reproduce",
     "records.study.study_record",
     "explorer.server.serve",

@@ -120,7 +120,9 @@ def decode(
     if issubclass(kind, enum.Enum):
         return kind(rest["value"])
     types = {field.name: str(field.type) for field in dataclasses.fields(kind)}
-    if set(rest) != set(types):
+    # What came later has a default.
+    later = {f.name for f in dataclasses.fields(kind) if f.default is not dataclasses.MISSING}
+    if not set(types) - later <= set(rest) <= set(types):
         raise ValueError(f"a {data['is']} with other entries than {', '.join(sorted(types))}")
     values = {name: inner(value) for name, value in rest.items()}
     for name, value in values.items():

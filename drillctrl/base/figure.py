@@ -6,11 +6,12 @@ import base64
 import io
 import textwrap
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
-from drillctrl.base.files import replacing
+from drillctrl.base.figure_data import figure_table
+from drillctrl.base.files import replacing, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 # Okabe and Ito's palette, told apart by colour-blind readers too.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 PALETTE = (BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9")
-FIGURE_ENDINGS = (".pdf", ".png", ".svg")
+FIGURE_ENDINGS = (".pdf", ".png", ".svg", ".csv")
+# Widths of one column and two, mm, texts, points, and the widest figure of one column, inches.
+JOURNAL = (88.0, 180.0, 7.0, 6.6)
+STYLES = ("screen", "journal")
 
 
 def axis_name(quantity: str, unit: str = "") -> str:
@@ -76,6 +80,12 @@ def restyled(drawn: Figure | Axes, width: float, points: float) -> Figure:
     figure.set_size_inches(inches, inches * up / across)
     for text in figure.findobj(Text):
         text.set_fontsize(points)
+    # What is longer than the figure is broken; letters are about half as wide as high.
+    for ax in figure.axes:
+        for label, room in ((ax.xaxis.label, inches), (ax.yaxis.label, inches * up / across)):
+            most = int(0.8 * room * 72.0 / (0.55 * points))
+            if len(label.get_text()) > most:
+                label.set_text(headline(label.get_text(), most))
     return figure
 
 
@@ -86,28 +96,60 @@ def embedded(drawn: Figure | Axes) -> str:
     return base64.b64encode(stream.getvalue()).decode("ascii")
 
 
-def _write(drawn: Figure | Axes, stream: IO[bytes], ending: str) -> None:
+def _write(drawn: Figure | Axes, stream: IO[bytes], ending: str, style: str = "screen") -> None:
     """Write a figure; the same one has the same bytes."""
     import matplotlib as mpl
 
     metadata = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     figure = drawn.get_figure(root=True)
     assert figure is not None
-    with mpl.rc_context({"svg.hashsalt": "drillctrl"}):
-        figure.savefig(stream, format=ending[1:], dpi=150, metadata=metadata.get(ending))
+    words: dict[str, Any] = {"svg.hashsalt": "drillctrl"}
+    dots = 150
+    if style == "journal":
+        # Texts as texts, in fonts that publishers take.
+        words |= {"svg.fonttype": "none", "pdf.fonttype": 42}
+        dots = 600
+    with mpl.rc_context(words):  # type: ignore[arg-type, unused-ignore]
+        figure.savefig(stream, format=ending[1:], dpi=dots, metadata=metadata.get(ending))
 
 
-def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
+def save_figure(drawn: Figure | Axes, path: str | Path, style: str = "screen") -> None:
     """Write a figure, or that of some Axes, by the file's ending, whole or not at all.
+
+    Parameters
+    ----------
+    drawn : Figure or Axes
+        What is drawn.
+    path : str or Path
+        ``.png``, ``.pdf``, ``.svg``, or ``.csv`` for the data of the figure as a table.
+    style : {"screen", "journal"}
+        For a journal it is 88 or 180 mm wide, with texts of 7 points that stay texts.
 
     Raises
     ------
     InputError
-        If the ending is none of .pdf, .png, .svg.
+        If the ending or the style is none of these.
     """
     check_figure_path(path)
+    check_style(style)
+    ending = Path(path).suffix.lower()
+    if ending == ".csv":
+        write_text(path, figure_table(drawn))
+        return
+    if style == "journal":
+        figure = drawn.get_figure(root=True)
+        assert figure is not None
+        one, two, points, widest = JOURNAL
+        width = one if figure.get_size_inches()[0] <= widest else two
+        restyled(drawn, width, points)
     with replacing(path) as file:
-        _write(drawn, file, Path(path).suffix.lower())
+        _write(drawn, file, ending, style)
+
+
+def check_style(style: str) -> None:
+    """Raise `InputError` if there is no such style."""
+    if style not in STYLES:
+        raise InputError("style", style, f"one of {', '.join(STYLES)}")
 
 
 def check_figure_path(path: str | Path) -> None:

@@ -54,7 +54,25 @@ class Language:
 
     def text(self, quantity: str, value: float, digits: int = 4) -> str:
         """Return an SI value as a number in few digits with its unit."""
-        return f"{self.number(quantity, value):.{digits}g} {self.unit(quantity)}".rstrip()
+        return f"{short(self.number(quantity, value), digits)} {self.unit(quantity)}".rstrip()
+
+    def gain(self, unit: str) -> Told:
+        """Return how a gain in an SI unit such as N·m·s/rad is told."""
+        if self is not FIELD:
+            return Told(unit, 1.0)
+        factor = 1.0
+        if unit.startswith("N·m"):
+            unit, factor = unit.replace("N·m", "ft·lbf"), 1.0 / (_FOOT * _POUND_FORCE)
+        elif unit.startswith("N"):
+            unit, factor = unit.replace("N", "lbf", 1), 1.0 / _POUND_FORCE
+        if unit.endswith("/m"):
+            unit, factor = f"{unit[:-1]}ft", factor * _FOOT
+        return Told(unit, factor)
+
+
+def short(value: float, digits: int) -> str:
+    """Return a number in few digits; a large one to the unit, with no power of ten."""
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
 
 
 def _language(name: str, **units: tuple[str, float]) -> Language:
@@ -130,4 +148,18 @@ def language_named(name: str | None, *, with_rig: bool) -> Language:
     if found is not DIMENSIONLESS and not with_rig:
         wanted = "dimensionless, or given with --rig: a point without a rig has no units"
         raise InputError("units", name, wanted)
+    return found
+
+
+def told_language(units: str | None) -> Language:
+    """Return a language with units, SI without a name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or it has none.
+    """
+    found = language_named(units, with_rig=True)
+    if found is DIMENSIONLESS:
+        raise InputError("units", found.name, "si or field: without a point there is no scale")
     return found

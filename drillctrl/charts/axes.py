@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.language import DIMENSIONLESS, SI, Language
 from drillctrl.base.units import Dimension
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
@@ -25,16 +25,17 @@ GROUPS = {
     "kappa": (0.0, 1e2, "κ"),
     "damping": (0.0, 1e2, "ξ = κ"),
 }
+# Axis of a rig → what a language has a unit for, what a text has to be, and words.
 RIG_AXES: dict[str, tuple[str, Dimension, str]] = {
-    "speed": ("rpm", units.ROTARY_SPEED, "rotary speed"),
-    "rop": ("m/h", units.SPEED, "rate of penetration"),
-    "wob": ("kN", units.FORCE, "weight on bit"),
-    "rock_strength": ("MPa", units.STRESS, "rock strength"),
+    "speed": ("angular_rate", units.ROTARY_SPEED, "rotary speed"),
+    "rop": ("axial_rate", units.SPEED, "rate of penetration"),
+    "wob": ("force", units.FORCE, "weight on bit"),
+    "rock_strength": ("stress", units.STRESS, "rock strength"),
 }
 # Of rigs whose string is known.
 STRING_AXES: dict[str, tuple[str, Dimension, str]] = {
-    "depth": ("m", units.LENGTH, "depth"),
-    "mud": ("kg/m^3", units.DENSITY, "mud weight"),
+    "depth": ("depth", units.LENGTH, "depth"),
+    "mud": ("density", units.DENSITY, "mud weight"),
 }
 
 
@@ -74,7 +75,8 @@ def make_axis(
     Parameters
     ----------
     given : Axis or sequence
-        Limits are numbers; for rig axes numbers in rpm, m/h, kN or MPa, or texts with a unit.
+        Limits are numbers; for rig axes numbers in the units in which the case is told (rpm,
+        m/h, kN, MPa; rpm, ft/h, klbf, ksi), or texts with a unit.
     structure : FeedbackStructure or None
         Whose gains may be axes.
     case : Case
@@ -111,15 +113,20 @@ def make_axis(
         label = name.replace("_", " ")
     elif name in rigs:
         floor, ceiling = 0.0, 1e6
-        unit, dimension, word = {**RIG_AXES, **STRING_AXES}[name]
+        language = axis_language(case)
+        quantity, dimension, word = {**RIG_AXES, **STRING_AXES}[name]
+        unit = language.unit(quantity)
         label = f"{word}, {unit}"
-        low, high = (_in_unit(name, v, unit, dimension) for v in (low, high))
+        low, high = (
+            _in_unit(name, v, dimension, to_si_factor(name, language)) for v in (low, high)
+        )
         if name in STRING_AXES:
-            floor, ceiling = permitted_range(string_of(case.rig), name)
+            allowed = permitted_range(string_of(case.rig), name)
+            floor, ceiling = (value / to_si_factor(name, language) for value in allowed)
         if name == "wob" and case.rig_point is not None:
             # The wear flat carries this much before anything is cut.
             idle = steady_state(replace(case.rig_point, penetration_rate=0.0)).weight_on_bit
-            floor = units.from_si(idle, dimension, unit)
+            floor = idle / to_si_factor(name, language)
     of = f", {unit}" if name in STRING_AXES else ""
     low = checked_number(f"{name} (lower limit{of})", low, floor, ceiling)
     high = checked_number(f"{name} (upper limit{of})", high, floor, ceiling)
@@ -128,10 +135,15 @@ def make_axis(
     return Axis(name, low, high, unit, label)
 
 
-def _in_unit(name: str, value: object, unit: str, dimension: Dimension) -> object:
+def _in_unit(name: str, value: object, dimension: Dimension, factor: float) -> object:
     if not isinstance(value, str):
         return value
-    return units.from_si(units.to_si(name, value, dimension), dimension, unit)
+    return float(f"{units.to_si(name, value, dimension) / factor:.15g}")
+
+
+def axis_language(case: Case) -> Language:
+    """Return the language of a rig's axes, which have units even where results have none."""
+    return SI if case.language is DIMENSIONLESS else case.language
 
 
 def gain_label(name: str) -> str:
@@ -140,8 +152,7 @@ def gain_label(name: str) -> str:
     return name[:1] + name[1:].translate(digits)
 
 
-@functools.cache
-def to_si_factor(name: str) -> float:
+def to_si_factor(name: str, language: Language) -> float:
     """Return the SI value of one unit of a rig axis."""
-    unit, dimension, _ = {**RIG_AXES, **STRING_AXES}[name]
-    return units.to_si(name, f"1 {unit}", dimension)
+    quantity, _, _ = {**RIG_AXES, **STRING_AXES}[name]
+    return 1.0 / language.units[quantity].per_si

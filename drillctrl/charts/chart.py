@@ -114,7 +114,7 @@ class StabilityChart:
             )
         frequencies = [curve.omega for curve in self.curves]
         if frequencies:
-            factor, _, unit = root_scales(plane.case.rig)[1]
+            factor, _, unit = root_scales(plane.case.told_rig)[1]
             omega = factor * np.concatenate(frequencies)
             lines.append(
                 f"  boundary  {len(self.curves)} curve(s), frequencies {omega.min():.3g} "

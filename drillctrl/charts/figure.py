@@ -13,7 +13,7 @@ from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
 from drillctrl.charts.plane import held_text
 from drillctrl.drilling.gain_units import control_text
-from drillctrl.drilling.quantities import root_scales
+from drillctrl.drilling.quantities import root_scales, told_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,15 +34,19 @@ def label_axes(ax: Axes, plane: Plane) -> None:
     ax.set_ylim(plane.y.low, plane.y.high)
     ax.set_xlabel(axis_text(plane.x))
     ax.set_ylabel(axis_text(plane.y))
-    if plane.rig_point is None:
+    if (told := plane.case.told_point) is None:
         return
-    rig = plane.rig_point.rig
-    rpm = 30.0 / np.pi / rig.time_scale
+    rig, language = told.rig, told.language
+    rpm, turns = told_scale("angular_rate", rig, language)
     # v0 = δ0 ω0: at one speed, δ0 is proportional to the rate of penetration.
-    metres = plane.rig_point.rotary_speed * rig.axial_scale * 3600.0
+    advance, rate = told_scale("axial_rate", rig, language)
+    speed = language.text("angular_rate", told.rotary_speed, 3)
     twins = {
-        "omega0": (rpm, axis_name("rotary speed", "rpm")),
-        "delta0": (metres, axis_name(f"rate of penetration at {_speed_text(plane)}", "m/h")),
+        "omega0": (rpm, axis_name("rotary speed", turns)),
+        "delta0": (
+            advance * told.rotary_speed * rig.time_scale,
+            axis_name(f"rate of penetration at {speed}", rate),
+        ),
     }
     if plane.x.name in twins:
         factor, text = twins[plane.x.name]
@@ -54,11 +58,6 @@ def label_axes(ax: Axes, plane: Plane) -> None:
 
 def _scaling(factor: float) -> tuple[Scale, Scale]:
     return (lambda value: np.asarray(value) * factor, lambda value: np.asarray(value) / factor)
-
-
-def _speed_text(plane: Plane) -> str:
-    assert plane.rig_point is not None
-    return f"{plane.rig_point.rotary_speed * 30.0 / np.pi:.0f} rpm"
 
 
 def axis_text(axis: Axis) -> str:
@@ -99,7 +98,9 @@ def plane_title(plane: Plane, name: str | None = None) -> str:
     elif plant is None or _has_gain_axis(plane):
         head = structure.name
     else:
-        head = control_text(structure, plane.K1, plane.K2, plant, plane.case.rig)
+        head = control_text(
+            structure, plane.K1, plane.K2, plant, plane.case.told_rig, plane.case.language
+        )
     return f"{head}; {held}" if held else head
 
 
@@ -218,11 +219,11 @@ def plot_chart(
         drawn = LineCollection(
             list(np.concatenate(pieces)), cmap="cividis", linewidths=2.2, zorder=3
         )
-        rig = plane.case.rig
+        rig = plane.case.told_rig
         scale = 1.0 if rig is None else root_scales(rig)[1][0]
         drawn.set_array(scale * np.concatenate(speeds))
         ax.add_collection(drawn, autolim=False)
-        twin = plane.rig_point is not None and plane.y.name == "delta0"
+        twin = plane.case.told_rig is not None and plane.y.name == "delta0"
         bar = ax.figure.colorbar(drawn, ax=ax, pad=0.12 if twin else 0.02)
         told = "frequency that sets in there"
         bar.set_label(axis_name(told, "Hz") if rig else axis_name(f"{told}, |Im s|"))
@@ -279,7 +280,7 @@ def plot_charts(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
         label_axes(ax, next(iter(charts.values())).plane)
     # Above the axes: shaded sets leave no free corner. A twin axis needs its room first.
     twin = any(
-        chart.plane.rig_point is not None and chart.plane.x.name == "omega0"
+        chart.plane.case.told_rig is not None and chart.plane.x.name == "omega0"
         for chart in charts.values()
     )
     ax.legend(

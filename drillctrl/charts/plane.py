@@ -14,7 +14,15 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.charts.axes import GROUPS, RIG_AXES, STRING_AXES, Axis, make_axis, to_si_factor
+from drillctrl.charts.axes import (
+    GROUPS,
+    RIG_AXES,
+    STRING_AXES,
+    Axis,
+    axis_language,
+    make_axis,
+    to_si_factor,
+)
 from drillctrl.charts.string_loops import EFFORTS, MOTIONS, BitLoads, exact_count, si_loads
 from drillctrl.delay.closing import close_loop, gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
@@ -102,7 +110,7 @@ class Plane:
                 "wob": steady_state(rig_point).weight_on_bit if name == "wob" else 0.0,
                 "rock_strength": rig_point.rig.rock_strength,
             }[name]
-            return value / to_si_factor(name)
+            return value / to_si_factor(name, axis_language(self.case))
         if name == "damping" and point is not None and point.xi == point.kappa:
             return point.xi
         known = self.case.parameters
@@ -141,7 +149,8 @@ class Plane:
     def _at_rig(self, values: dict[str, float]) -> RigPoint:
         point = self.rig_point
         assert point is not None
-        si = {name: value * to_si_factor(name) for name, value in values.items()}
+        language = axis_language(self.case)
+        si = {name: value * to_si_factor(name, language) for name, value in values.items()}
         rig = point.rig
         if self.varied_string:
             rig = _changed(rig, si.get("depth"), si.get("mud"))
@@ -149,8 +158,9 @@ class Plane:
             rig = rig.with_rock_strength(si["rock_strength"])
         speed = si.get("speed", point.rotary_speed)
         if "wob" in si:
-            return rig_point_at_weight_on_bit(rig, speed, si["wob"])
-        return RigPoint(rig, speed, si.get("rop", point.penetration_rate))
+            found = rig_point_at_weight_on_bit(rig, speed, si["wob"])
+            return replace(found, units=point.units)
+        return RigPoint(rig, speed, si.get("rop", point.penetration_rate), point.units)
 
     @property
     def varied_string(self) -> bool:
@@ -264,7 +274,7 @@ class Plane:
         return close_loop(case.system(self.structure.inputs), self.structure, now[0], past[0])
 
 
-_HELD_OF_RIG = {"speed": "{:.4g} rpm", "rop": "{:.4g} m/h", "rock_strength": "rock of {:.4g} MPa"}
+_HELD_OF_RIG = {"speed": "{:.4g} {}", "rop": "{:.4g} {}", "rock_strength": "rock of {:.4g} {}"}
 _HELD = {
     "omega0": "ω0 = {:.4g}",
     "delta0": "δ0 = {:.4g}",
@@ -291,8 +301,14 @@ def held_text(plane: Plane) -> str:
         return ""
     over = {plane.x.name, plane.y.name}
     over = over.union(*(_MOVES.get(name, set()) for name in over))
-    forms = _HELD if plane.rig_point is None else _HELD_OF_RIG
-    return ", ".join(form.format(plane.value_of(n)) for n, form in forms.items() if n not in over)
+    language = plane.case.language
+    forms = _HELD_OF_RIG if language.units else _HELD
+    told = []
+    for name, form in forms.items():
+        if name not in over:
+            unit = language.unit(RIG_AXES[name][0]) if language.units else ""
+            told.append(form.format(plane.value_of(name), unit))
+    return ", ".join(told)
 
 
 def check_plane(plane: Plane) -> None:

@@ -6,7 +6,9 @@ from typing import Any
 
 from drillctrl.base.errors import InputError
 
+# Of bare numbers on a rig's axes.
 _UNITS = {"speed": "rpm", "rop": "m/h", "wob": "kN"}
+_OF_FIELD = {"speed": "rpm", "rop": "ft/h", "wob": "klbf"}
 
 
 def read_axis(option: str, text: str) -> tuple[str, object, object]:
@@ -36,6 +38,7 @@ def read_axis(option: str, text: str) -> tuple[str, object, object]:
 def with_axes(point: dict[str, Any], *axes: tuple[str, object, object]) -> dict[str, Any]:
     """Return the options of the point, those that are axes at the upper end of theirs."""
     given = dict(point)
+    units = _OF_FIELD if point.get("units") == "field" else _UNITS
     for name, _, high in axes:
         if given.get("rig") is None or name not in ("speed", "rop", "wob"):
             continue
@@ -44,7 +47,7 @@ def with_axes(point: dict[str, Any], *axes: tuple[str, object, object]) -> dict[
             raise InputError(f"--{other}", point[other], f"left out where {name} is an axis")
         # Two axes that contradict each other are told as such later.
         if given[name] is None and (other is None or given[other] is None):
-            given[name] = high if isinstance(high, str) else f"{high} {_UNITS[name]}"
+            given[name] = high if isinstance(high, str) else f"{high} {units[name]}"
     return given
 
 

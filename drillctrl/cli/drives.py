@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -11,7 +12,7 @@ from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
-from drillctrl.cli.point import read_point
+from drillctrl.cli.point import read_point, rig_name
 
 if TYPE_CHECKING:
     from drillctrl.strings.drive_table import DriveTable
@@ -21,10 +22,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
-_BEARS = ("rig", "structures", "as_json", "out", *_ALONE)
+_BEARS = ("rig", "units", "structures", "as_json", "out", *_ALONE)
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
 _TABLE_BEARS = ("rig", "depth", "structure", "require_stable", "as_json", "out", "plot")
-_DESIGN_BEARS = (*_POINT, "structure", "require_stable", "as_json", "out", "plot")
+_DESIGN_BEARS = (*_POINT, "units", "structure", "require_stable", "as_json", "out", "plot")
 
 
 def drive_options(command: Command) -> Command:
@@ -108,7 +109,10 @@ def deliver_drive_design(
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
     error = point.get("depth_error")
     found = design_drive(where, structure, length_error=0.2 if error is None else error)
-    deliver(found.to_dict(), found.summary, found.plot, as_json=as_json, out=out, plot=plot)
+    units = point.get("units") or "si"
+    text = functools.partial(found.summary, units)
+    draw = functools.partial(found.plot, rig_name(point))
+    deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
     return found.stable
 
 
@@ -211,5 +215,5 @@ def deliver_drives(
     found = compare_drives(load_rig(point["rig"]), names, FallingTorque(**falling))
     _write(found, out)
     if given["plot"] is not None:
-        write_figure(given["plot"], found.plot())
-    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+        write_figure(given["plot"], found.plot(rig_name(point)))
+    click.echo(json_text(found.to_dict()) if as_json else found.summary(point.get("units") or "si"))

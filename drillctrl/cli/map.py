@@ -72,7 +72,7 @@ _COUNTS = (15, 12)
 @click.option("--workers", type=int, help="Processes (default: one for each core).")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster, such as tcp://host:8786.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
-@click.option("--out", type=click.Path(), help="Write FILE.csv or .json; resumes when killed.")
+@click.option("--out", type=click.Path(), help="Write FILE.csv, .json or .nc; resumes when killed.")
 @click.option("--plot", type=click.Path(), help="Draw the map: FILE.png, .svg, .pdf.")
 @click.option(
     "--show",
@@ -80,6 +80,9 @@ _COUNTS = (15, 12)
     show_default=True,
     metavar="NAMES",
     help="Drawn: outcome, swing, stick_fraction, off_rock_fraction, feed, weight_ratio.",
+)
+@click.option(
+    "--difference", is_flag=True, help="Draw beside these what control changes: better, worse."
 )
 def map_command(
     x_axis: str | None,
@@ -93,6 +96,7 @@ def map_command(
     out: str | None,
     plot: str | None,
     show: str,
+    difference: bool,
     **options: Any,
 ) -> None:
     """Map stick-slip and bit bounce over what a driller sets, by nonlinear runs.
@@ -115,6 +119,8 @@ def map_command(
     """
     check_folder("--out", out)
     check_figure(plot)
+    if difference and all(options[name] is None for name in ("structure", "table")):
+        raise InputError("--difference", "given", "left out where there is no control")
     shown = tuple(part.strip() for part in show.split(","))
     if workers is not None:
         checked_integer("workers", workers, 1, 1024)
@@ -133,8 +139,9 @@ def map_command(
     from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.starts import possible_starts
     from drillctrl.simulation.structure import structure_of
-    from drillctrl.studies.vibration import check_map_path, vibration_map
+    from drillctrl.studies.vibration import vibration_map
     from drillctrl.studies.vibration_figure import check_shown
+    from drillctrl.studies.vibration_files import check_map_path
 
     if out is not None:
         with naming("--out", "path"):
@@ -177,7 +184,7 @@ def map_command(
     if checkpoint is not None:
         _finish(checkpoint)
     if plot is not None:
-        write_figure(plot, result.plot(shown, rig_name(options)))
+        write_figure(plot, result.plot(shown, rig_name(options), difference))
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
 
 

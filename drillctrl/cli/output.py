@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Where the context of a command keeps how figures look.
+STYLE = "drillctrl.style"
+
+
 def json_text(fields: dict[str, Any]) -> str:
     """Return the JSON object that a verb prints; NaN and Infinity are our fault."""
     return json.dumps(fields, indent=2, allow_nan=False, ensure_ascii=False)
@@ -45,9 +49,10 @@ def check_figure(plot: str | None) -> None:
     """Refuse a bad name of a figure before any work is done."""
     check_folder("--plot", plot)
     if plot is not None:
-        from drillctrl.base.figure import check_figure_path
+        from drillctrl.base.figure import check_figure_path, check_style
 
         check_figure_path(plot)
+        check_style(click.get_current_context().meta.get(STYLE, "screen"))
 
 
 def check_json(out: str | None) -> None:
@@ -83,7 +88,8 @@ def write_figure(plot: str, drawn: Figure | Axes) -> None:
     """Write a figure by the file's ending."""
     from drillctrl.base.figure import save_figure
 
-    writing("--plot", plot, lambda: save_figure(drawn, plot))
+    style = click.get_current_context().meta.get(STYLE, "screen")
+    writing("--plot", plot, lambda: save_figure(drawn, plot, style))
 
 
 def deliver(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,12 @@ def point_options(command: Command) -> Command:
         click.option("--rop", help="Rate of penetration with its unit, such as '20 m/h'."),
         click.option("--wob", help="Weight on bit instead of --rop, such as '20 kN'."),
         click.option("--rock-strength", help="Instead of the rig's own, such as '60 MPa'."),
+        click.option(
+            "--units",
+            metavar="NAME",
+            help="Results in si (m/h, kN: usual with a rig), field (ft/h, klbf) or dimensionless; "
+            "JSON stays in SI or dimensionless but for axes.",
+        ),
     ]
     return with_options(command, options)
 
@@ -64,6 +71,8 @@ def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
     InputError
         If dimensionless and rig options are mixed, or one is missing or wrong.
     """
+    from drillctrl.base.language import language_named
+
     groups = {k: options[k] for k in _DIMENSIONLESS if options.get(k) is not None}
     rig = {k: options[k] for k in _RIG if options.get(k) is not None}
     if groups and rig:
@@ -73,7 +82,10 @@ def read_point(options: dict[str, Any]) -> OperatingPoint | RigPoint:
             groups[first],
             f"left out where --{next(iter(rig)).replace('_', '-')} gives the point in rig units",
         )
-    return _rig_point(rig) if rig else _operating_point(groups)
+    language = language_named(options.get("units"), with_rig=bool(rig))
+    if not rig:
+        return _operating_point(groups)
+    return replace(_rig_point(rig), units=language.name)
 
 
 def rig_name(options: Mapping[str, Any]) -> str | None:

@@ -26,7 +26,6 @@ from drillctrl.cli.verb import Verb, naming
 @click.option(
     "--date", default=None, help="Printed on it; else that of SOURCE_DATE_EPOCH, else none."
 )
-@click.option("--units", metavar="NAME", help="Told in si (default) or field: ft/h, klbf …")
 @click.option("--workers", type=int, default=2, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object (SI) instead.")
 @click.option("--out", type=click.Path(), required=True, help="Write FILE.html.")
@@ -34,7 +33,6 @@ def report_command(
     structure: str | None,
     no_map: bool,
     date: str | None,
-    units: str | None,
     workers: int,
     as_json: bool,
     out: str,
@@ -48,9 +46,11 @@ def report_command(
 
     \b
     Examples:
-      drillctrl report --rig table1 --speed "120 rpm" --rop "20 m/h" --out report.html
-      drillctrl report --rig paper-string --speed "120 rpm" --rop "20 m/h" --no-map \\
-          --date 2026-11-29 --out report.html
+      drillctrl report --rig table1 --speed "150 rpm" --rop "20 m/h" --no-map --out report.html
+      drillctrl report --rig table1 --speed "150 rpm" --rop "65 ft/h" --structure p --no-map \\
+          --units field --date 2026-11-29 --out report.html
+
+    Without --no-map, and for long strings, it takes up to a minute.
     """
     check_folder("--out", out)
     from drillctrl.base.errors import checked_integer
@@ -77,7 +77,6 @@ def report_command(
             name=rig_name(point) or "",
             date=_date(date),
             mapped=not no_map,
-            units=units or "si",
             executor=executor,
             progress=progress,
             stage=stage,

@@ -21,9 +21,12 @@ def rig_command() -> None:
 @rig_command.command(name="check", cls=Verb)
 @click.argument("source", metavar="FILE|PRESET")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
+@click.option("--units", metavar="NAME", help="In si (default) or field: ft, in, klbf …")
 @click.option("--out", type=click.Path(), help="Write the rig as a file to change: FILE.toml.")
 @click.option("--plot", type=click.Path(), help="Draw string and modes: FILE.png, .svg, .pdf.")
-def check_command(source: str, as_json: bool, out: str | None, plot: str | None) -> None:
+def check_command(
+    source: str, as_json: bool, units: str | None, out: str | None, plot: str | None
+) -> None:
     """Say what is understood of a rig file: string, weights, lumped numbers, modes.
 
     \b
@@ -34,18 +37,20 @@ def check_command(source: str, as_json: bool, out: str | None, plot: str | None)
     """
     check_figure(plot)
     check_ending(out, ".toml")
+    from drillctrl.base.language import told_language
     from drillctrl.strings.check import check_rig
     from drillctrl.strings.files import load_rig
     from drillctrl.strings.words import rig_summary
 
+    language = told_language(units)
     rig = load_rig(source)
     found = check_rig(rig)
     if plot is not None:
         from drillctrl.strings.figure import plot_rig
 
-        write_figure(plot, plot_rig(found))
+        write_figure(plot, plot_rig(found, language))
     if out is not None:
         from drillctrl.strings.saving import save_rig
 
         writing("--out", out, lambda: save_rig(rig, out))
-    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found))
+    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found, language))

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import told_language
+from drillctrl.base.text import wrapped
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
-from drillctrl.strings.drives_words import law_text
+from drillctrl.strings.drives_words import law_text, setting_sentence
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.strings.rig import StringRig
@@ -82,13 +84,13 @@ class DriveDesign:
             "elapsed_seconds": self.elapsed_seconds,
         }
 
-    def summary(self) -> str:
-        """Return a text for people."""
+    def summary(self, units: str = "si") -> str:
+        """Return a text for people, in the units of ``"si"`` or ``"field"``."""
         lines = [
-            f"Top drive under {self.drive.control.name}",
-            f"  Law: {law_text(self.drive.control)}",
+            wrapped(setting_sentence(self.drive.control, told_language(units))),
+            wrapped(f"Law in SI units: {law_text(self.drive.control)}"),
             "",
-            self.found.summary(),
+            self.found.summary(units),
         ]
         if self.drilling is not None:
             said = self.drilling
@@ -107,9 +109,9 @@ class DriveDesign:
             return f"all vibration dies away, {hertz:.3g} Hz slowest, by {-rate:.3g} 1/s"
         return f"vibration GROWS, {hertz:.3g} Hz fastest, by {rate:.3g} 1/s"
 
-    def plot(self) -> Figure:
-        """Draw ``|r|``, impedance, and damping over frequency."""
-        return self.found.plot()
+    def plot(self, name: str | None = None) -> Figure:
+        """Draw ``|r|``, impedance, and damping over frequency, under the name of the rig."""
+        return self.found.plot(name)
 
 
 @checks_kinds

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from drillctrl.base import units
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none, set_out
 from drillctrl.designs.quieter import Quieter, quieter
@@ -195,7 +194,11 @@ def _alternative_lines(found: Alternative) -> Lines:
     assert other.structure is not None
     case = other.case
     told = {
-        name: [t for row in gain_texts(other.structure, matrix, case.plant, case.rig) for t in row]
+        name: [
+            t
+            for row in gain_texts(other.structure, matrix, case.plant, case.told_rig, case.language)
+            for t in row
+        ]
         for name, matrix in (("K1", other.K1), ("K2", other.K2))
         if matrix.any()
     }
@@ -266,24 +269,22 @@ def _quieter_lines(design: Design, found: tuple[Quieter, ...]) -> Lines:
 
 def _change_text(design: Design, change: Quieter) -> str:
     """Return a change in the units of whoever asked."""
-    point = design.rig_point
+    point, language = design.case.told_point, design.case.language
     if change.kind == "blades":
         return f"{change.value:.0f} blades"
     if point is None:
         what = "the speed" if change.kind == "speed" else "the feed"
         return f"{change.value:.2g} times {what}"
     if change.kind == "speed":
-        rpm = units.from_si(change.value * point.rotary_speed, units.ROTARY_SPEED, "rpm")
-        return f"{rpm:.4g} rpm at this rate of penetration"
-    rate = units.from_si(change.value * point.penetration_rate, units.SPEED, "m/hour")
-    return f"{rate:.4g} m/h at this speed"
+        speed = language.text("angular_rate", change.value * point.rotary_speed)
+        return f"{speed} at this rate of penetration"
+    return f"{language.text('axial_rate', change.value * point.penetration_rate)} at this speed"
 
 
 def _speed_text(design: Analysis) -> str:
     """Return a rotary speed, in rpm where there is a rig."""
-    if design.rig_point is not None:
-        rpm = units.from_si(design.rig_point.rotary_speed, units.ROTARY_SPEED, "rpm")
-        return f"{rpm:.4g} rpm"
+    if (told := design.case.told_point) is not None:
+        return told.language.text("angular_rate", told.rotary_speed)
     assert design.point is not None
     return f"ω0 = {design.point.omega0:.4g}"
 

@@ -18,6 +18,7 @@ from drillctrl.designs.words import design_lines, result_lines
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
+from drillctrl.strings.named_roots import turned_by
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,11 +107,12 @@ class Analysis(AnalysisValues):
         """Draw the rightmost roots with and without feedback, under the name of the rig."""
         from drillctrl.designs.figure import plot_roots
 
-        loops = {"without control": self.plant}
+        drive = turned_by(self.case)
+        loops = {"without control" if drive is None else drive.name: self.plant}
         if self.structure is not None:
             loops[f"with {self.structure.name}"] = self.system()
         place = ", ".join(text for text in (name, self.case.place) if text)
-        return plot_roots(loops, self.loop.dominant_roots, place, self.case.rig, ax)
+        return plot_roots(loops, self.loop.dominant_roots, place, self.case.told_rig, ax)
 
 
 class Design(DesignValues, Analysis):

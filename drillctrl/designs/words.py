@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from drillctrl.base import units
 from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.loop_analysis import LoopAnalysis
 from drillctrl.designs.values import AnalysisValues, DesignValues
@@ -28,7 +27,23 @@ def result_lines(result: AnalysisValues) -> Lines:
     word = "stabilised" if result.stable else "not stabilised"
     if result.structure is None:
         word = "stable" if result.stable else "not stable"
-    return [*_opening(result), *_loop_lines(result, f"{word}: α = ", [])]
+    return [
+        *_answer_lines(result),
+        *_opening(result),
+        *_loop_lines(result, f"{word}: α = ", []),
+    ]
+
+
+def _answer_lines(result: AnalysisValues) -> Lines:
+    """Say first, of a rig, what becomes of small vibration."""
+    if (rig := result.case.told_rig) is None:
+        return []
+    rate = result.loop.spectral_abscissa / rig.time_scale
+    hertz = abs(result.loop.dominant_roots[0].value.imag) / (2.0 * math.pi * rig.time_scale)
+    which = f"{hertz:.3g} Hz" if hertz else "without swinging"
+    if result.loop.stable:
+        return [("Vibration", f"small vibration dies away, slowest {which}, by {-rate:.3g} 1/s")]
+    return [("Vibration", f"small vibration GROWS, fastest {which}, by {rate:.3g} 1/s")]
 
 
 def design_lines(design: DesignValues) -> Lines:
@@ -89,10 +104,10 @@ def _figures_text(found: Figures) -> str:
 
 def _input_text(result: AnalysisValues, largest: float) -> str:
     assert result.structure is not None
-    if result.rig_point is None or result.structure.inputs != ("torque",):
+    rig = result.case.told_rig
+    if rig is None or result.structure.inputs != ("torque",):
         return f"{largest:.3g}"
-    newton_metres = largest * result.rig_point.rig.torsional_stiffness
-    return f"{units.from_si(newton_metres, units.TORQUE, 'kN*m'):.3g} kN·m"
+    return result.case.language.text("torque", largest * rig.torsional_stiffness, 3)
 
 
 def _root_text(s: complex) -> str:
@@ -102,23 +117,15 @@ def _root_text(s: complex) -> str:
 def _point_lines(result: AnalysisValues) -> Lines:
     p = result.point
     lines: Lines = []
-    if result.rig_point is not None:
-        rig_point, steady = result.rig_point, steady_state(result.rig_point)
-        rpm = units.from_si(rig_point.rotary_speed, units.ROTARY_SPEED, "rpm")
-        rop = units.from_si(rig_point.penetration_rate, units.SPEED, "m/hour")
-        lines += [
-            (
-                "Drilling",
-                f"{rpm:.6g} rpm, {rop:.6g} m/h in rock of "
-                f"{rig_point.rig.rock_strength / 1e6:.6g} MPa",
-            ),
-            (
-                "Steady load",
-                f"{steady.weight_on_bit / 1e3:.5g} kN on bit, "
-                f"{steady.torque_on_bit / 1e3:.5g} kN·m on bit, "
-                f"cut {steady.depth_of_cut * 1e3:.4g} mm per turn",
-            ),
-        ]
+    if (told := result.case.told_point) is not None:
+        steady, say = steady_state(told), result.case.language.text
+        place = f"{say('angular_rate', told.rotary_speed, 6)}, "
+        place += f"{say('axial_rate', told.penetration_rate, 6)} in rock of "
+        place += say("stress", told.rig.rock_strength, 6)
+        load = f"{say('force', steady.weight_on_bit, 5)} on bit, "
+        load += f"{say('torque', steady.torque_on_bit, 5)} on bit, "
+        load += f"cut {say('length', steady.depth_of_cut)} per turn"
+        lines += [("Drilling", place), ("Steady load", load)]
     if p is None:
         plant = result.plant
         delays = ", ".join(f"{tau:.6g}" for tau in plant.delays) or "none"
@@ -155,12 +162,12 @@ def _gain_lines(result: AnalysisValues) -> Lines:
         law += " + K2·(the same, τ0 ago)"
     refused = " (refused)" if result.verdict.refused else ""
     lines: Lines = [("Feedback", f"{structure.name}{refused}: {law}")]
-    plant, rig = result.case.plant, result.case.rig
+    plant, rig, language = result.case.plant, result.case.told_rig, result.case.language
     matrices = [("K1", "", result.K1, structure.K1_lower, structure.K1_upper)]
     if past:
         matrices.append(("K2", " delayed", result.K2, structure.K2_lower, structure.K2_upper))
     for name, when, *values in matrices:
-        gains, low, high = (gain_texts(structure, each, plant, rig) for each in values)
+        gains, low, high = (gain_texts(structure, each, plant, rig, language) for each in values)
         for i, row in enumerate(gains):
             for j, symbol in enumerate(outputs):
                 bounds = f"{low[i][j]} to {high[i][j]}"
@@ -189,8 +196,8 @@ def _loop_lines(result: AnalysisValues, word: str, aims: Lines) -> Lines:
     lines.append(("Dominant roots", ", ".join(roots)))
     if loop.stable:
         time = f"to 2 % in {loop.settling_time:.4g} time units"
-        if result.rig_point is not None:
-            seconds = loop.settling_time * result.rig_point.rig.time_scale
+        if (rig := result.case.told_rig) is not None:
+            seconds = loop.settling_time * rig.time_scale
             time += f" = {seconds:.3g} s"
         lines.append(("Settling", time))
     check = loop.certificate
@@ -216,8 +223,8 @@ def _motion_lines(design: DesignValues) -> Lines:
     if found is None:
         return []
     unit, per = 1.0, "unit of time"
-    if design.rig_point is not None:
-        unit, per = design.rig_point.rig.time_scale, "s"
+    if (rig := design.case.told_rig) is not None:
+        unit, per = rig.time_scale, "s"
     lines: Lines = [("Designed on", "the motion that is drilled with, torsional swings about it")]
     if found.why != ASKED:
         lines.append(("", f"because {found.why}"))

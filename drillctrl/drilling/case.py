@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import DIMENSIONLESS, Language
 from drillctrl.delay.system import DelaySystem
 from drillctrl.drilling.linear import LinearArrays, linear_arrays
 from drillctrl.drilling.motion import MotionArrays, motion_arrays
@@ -55,13 +55,29 @@ class Case:
         return None if self.rig_point is None else self.rig_point.rig
 
     @property
+    def language(self) -> Language:
+        """In which people are told results."""
+        return DIMENSIONLESS if self.rig_point is None else self.rig_point.language
+
+    @property
+    def told_point(self) -> RigPoint | None:
+        """The rig and its point in whose units results are told; None where they have none."""
+        return None if self.language is DIMENSIONLESS else self.rig_point
+
+    @property
+    def told_rig(self) -> Rig | None:
+        """The rig in whose units results are told; None where they have none."""
+        return None if self.told_point is None else self.told_point.rig
+
+    @property
     def place(self) -> str:
         """Where it drills, for titles: in the units of its rig where there is one."""
-        if self.rig_point is not None:
-            rpm = 30.0 / math.pi * self.rig_point.rotary_speed
-            rop = 3600.0 * self.rig_point.penetration_rate
-            strength = self.rig_point.rig.rock_strength / 1e6
-            return f"{rpm:.4g} rpm, {rop:.4g} m/h, rock of {strength:.4g} MPa"
+        if (told := self.told_point) is not None:
+            speed = self.language.text("angular_rate", told.rotary_speed)
+            rate = self.language.text("axial_rate", told.penetration_rate)
+            return (
+                f"{speed}, {rate}, rock of {self.language.text('stress', told.rig.rock_strength)}"
+            )
         p = self.point
         return "" if p is None else f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"
 

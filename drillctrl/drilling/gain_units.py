@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.language import SI, Language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.quantities import quotient_unit, si_scale
@@ -46,7 +47,11 @@ def rig_gain_units(
 
 
 def gain_texts(
-    structure: FeedbackStructure, gains: FloatArray, plant: Plant | None, rig: Rig | None
+    structure: FeedbackStructure,
+    gains: FloatArray,
+    plant: Plant | None,
+    rig: Rig | None,
+    language: Language = SI,
 ) -> list[list[str]]:
     """Return K1 or K2, (m, p), in few digits, with a rig in its units, by rows."""
     if rig is None or plant is None:
@@ -54,25 +59,35 @@ def gain_texts(
     factors, names = gain_units(structure, plant, rig)
     values = (gains * factors).tolist()
     return [
-        [_with_unit(value, unit) for value, unit in zip(row, units, strict=True)]
+        [_with_unit(value, *language.gain(unit)) for value, unit in zip(row, units, strict=True)]
         for row, units in zip(values, names, strict=True)
     ]
 
 
-def _with_unit(value: float, unit: str) -> str:
-    """Return a number in few digits, a large one with a k before the newton."""
-    if unit.startswith("N") and abs(value) >= 1e3:
+def _with_unit(value: float, unit: str, factor: float) -> str:
+    """Return a number in few digits, a large one with a k before the unit."""
+    value *= factor
+    if unit.startswith(("N", "ft", "lbf")) and abs(value) >= 1e3:
         return f"{value / 1e3:.3g} k{unit}"
+    if unit == "1":
+        return f"{value:.3g}"
     return f"{value:.3g} {unit}"
 
 
 def control_text(
-    structure: FeedbackStructure, K1: FloatArray, K2: FloatArray, plant: Plant, rig: Rig | None
+    structure: FeedbackStructure,
+    K1: FloatArray,
+    K2: FloatArray,
+    plant: Plant,
+    rig: Rig | None,
+    language: Language = SI,
 ) -> str:
     """Return a structure and its gains on one line, such as p: K1 = -2 kN·m/rad."""
     parts = []
     for label, gains in (("K1", K1), ("K2", K2)):
         if gains.any():
-            texts = [text for row in gain_texts(structure, gains, plant, rig) for text in row]
+            texts = [
+                text for row in gain_texts(structure, gains, plant, rig, language) for text in row
+            ]
             parts.append(f"{label} = {', '.join(texts)}")
     return f"{structure.name}: {'; '.join(parts)}" if parts else structure.name

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.language import LANGUAGES, Language, language_named
 from drillctrl.drilling.rig import Rig
 
 # Wear-flat groups of Table 1, used where a dimensionless point leaves them open.
@@ -101,6 +102,8 @@ class RigPoint:
         Ω0 > 0, rad/s.
     penetration_rate : float
         V0 ≥ 0, m/s.
+    units : {"si", "field", "dimensionless"}
+        In which people are told results; nothing that is computed depends on it.
     """
 
     made_by = "RigPoint(table1(), speed, rate), in rad/s and m/s"
@@ -108,12 +111,19 @@ class RigPoint:
     rig: Rig
     rotary_speed: float
     penetration_rate: float
+    units: str = field(default="si", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         speed = checked_number("rotary_speed", self.rotary_speed, 0.0, 1e6, open_low=True)
         rate = checked_number("penetration_rate", self.penetration_rate, 0.0, 1e3)
         object.__setattr__(self, "rotary_speed", speed)
         object.__setattr__(self, "penetration_rate", rate)
+        language_named(self.units, with_rig=True)
+
+    @property
+    def language(self) -> Language:
+        """The language of ``units``."""
+        return LANGUAGES[self.units]
 
     def operating_point(self) -> OperatingPoint:
         """Return the dimensionless groups (Eqs. 16, 18, 21; λ and β from Eqs. 3, 14)."""

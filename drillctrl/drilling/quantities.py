@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.language import SI, Language
 from drillctrl.drilling.rig import Rig
 
 # Quantity → SI unit.
@@ -18,17 +19,6 @@ SI_UNITS = {
     "torque": "N·m",
     "time": "s",
     "number": "1",
-}
-# What people on rigs read: a unit, and how many of it are one SI unit.
-FIELD_UNITS = {
-    "length": ("mm", 1e3),
-    "axial_rate": ("m/h", 3600.0),
-    "angle": ("rad", 1.0),
-    "angular_rate": ("rpm", 30.0 / math.pi),
-    "force": ("kN", 1e-3),
-    "torque": ("kN·m", 1e-3),
-    "time": ("s", 1.0),
-    "number": ("", 1.0),
 }
 # Rate of change of each quantity that a coordinate may have.
 RATES = {"length": "axial_rate", "angle": "angular_rate"}
@@ -78,14 +68,14 @@ def si_scale(quantity: str, rig: Rig) -> float:
     }[quantity]
 
 
-def field_scale(quantity: str, rig: Rig | None) -> tuple[float, str]:
-    """Return how many units of the field one dimensionless unit is, and that unit.
+def told_scale(quantity: str, rig: Rig | None, language: Language = SI) -> tuple[float, str]:
+    """Return how many units that are told one dimensionless unit is, and that unit.
 
     Without a rig they are 1 and an empty text.
     """
-    if rig is None:
+    if rig is None or not language.units:
         return 1.0, ""
-    unit, factor = FIELD_UNITS[quantity]
+    unit, factor = language.units[quantity]
     return si_scale(quantity, rig) * factor, unit
 
 
@@ -109,3 +99,11 @@ def quotient_unit(effort: str, quantity: str) -> str:
         return "1"
     base, _, time = denominator.partition("/")
     return f"{numerator}{'·' + time if time else ''}/{base}"
+
+
+def response_scale(rig: Rig | None, language: Language) -> tuple[float, str]:
+    """Return how many units that are told one dimensionless torque per speed is, and that unit."""
+    if rig is None:
+        return 1.0, ""
+    si = si_scale("torque", rig) * rig.time_scale
+    return language.number("impedance", si), language.unit("impedance")

@@ -8,7 +8,7 @@ from typing import Any
 
 from drillctrl.base.text import finite_or_none
 from drillctrl.motion.threshold import ModeAlong
-from drillctrl.motion.units import units_of
+from drillctrl.motion.units import told_units, units_of
 
 
 def along_fields(found: ModeAlong) -> dict[str, Any]:
@@ -52,7 +52,8 @@ def _along_unit(found: ModeAlong) -> str:
 
 def along_summary(found: ModeAlong) -> str:
     """Return what is told on a terminal of a mode over speed or rate."""
-    units, unit, own = units_of(found.case), _along_unit(found), found.own_value
+    units, (factor, unit) = told_units(found.case), found.told
+    own = found.own_value * factor
     name = unit or {"speed": "ω0", "rate": "V0"}[found.along]
     held = {"speed": "the rate of penetration held", "rate": "the rotary speed held"}[found.along]
     amplitude = statistics.median(each.amplitude for each in found.at)
@@ -60,7 +61,7 @@ def along_summary(found: ModeAlong) -> str:
         f"Torsional mode {found.number} at a swing of {amplitude:.2g}, {held}",
         f"{name:>9} {'damping left':>13} {'growth':>9} {'±':>8}",
     ]
-    for value, left, each in zip(found.values, found.damping_left, found.at, strict=True):
+    for value, left, each in zip(factor * found.values, found.damping_left, found.at, strict=True):
         if not math.isfinite(each.error):
             broken = each.response.broken
             told = "the bit swings of itself" if broken is None else broken.sentence
@@ -75,7 +76,9 @@ def along_summary(found: ModeAlong) -> str:
         sure = {each.sign for each in found.at} - {0}
         verb = "Decays" if sure == {-1} else "Grows"
         lines.append(f"{verb} wherever it is sure." if sure else "It is sure nowhere.")
-    unsure = [value for value, each in zip(found.values, found.at, strict=True) if not each.sign]
+    unsure = [
+        value for value, each in zip(factor * found.values, found.at, strict=True) if not each.sign
+    ]
     if unsure:
         listed = ", ".join(f"{value:.4g}" for value in unsure)
         lines.append(f"Not sure at {listed} {unit}: the simulator must decide there.")

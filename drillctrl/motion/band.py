@@ -20,7 +20,7 @@ from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.drilling.case import Case, Where, as_case
-from drillctrl.drilling.quantities import si_scale
+from drillctrl.drilling.quantities import response_scale
 from drillctrl.motion.loop import torsional_system
 from drillctrl.motion.response import FEWEST_PERIODS, BitResponse, bit_response
 from drillctrl.motion.torsion import torsional_modes, torsional_states
@@ -252,8 +252,8 @@ class BitBand:
         """Draw H over frequency, in SI where there is a rig."""
         from drillctrl.motion.figure import plot_response
 
-        rig = self.case.rig
-        scale = 1.0 if rig is None else si_scale("torque", rig) * rig.time_scale
+        rig = self.case.told_rig
+        scale, unit = response_scale(self.case.told_rig, self.case.language)
         hertz = 1.0 if rig is None else 1.0 / (2.0 * math.pi * rig.time_scale)
         omega, _, _ = self._known()
         fine = np.geomspace(omega[0], omega[-1], 200)
@@ -263,7 +263,7 @@ class BitBand:
             self.values * scale,
             self.errors * scale,
             (fine * hertz, self.rational()(1j * fine) * scale),
-            rig is not None,
+            unit,
             f"swing {amplitude:.2g} of the speed",
         )
 

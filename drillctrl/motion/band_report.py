@@ -7,7 +7,7 @@ from typing import Any
 
 from drillctrl.base.text import finite_or_none
 from drillctrl.motion.band import BitBand
-from drillctrl.motion.units import units_of
+from drillctrl.motion.units import told_units, units_of
 from drillctrl.spectrum.roots import spectral_abscissa
 
 
@@ -43,7 +43,7 @@ def band_fields(found: BitBand) -> dict[str, Any]:
 
 def band_summary(found: BitBand) -> str:
     """Return what is told of a band on a terminal."""
-    units, model = units_of(found.case), found.rational()
+    units, model = told_units(found.case), found.rational()
     rig = bool(units.rate_name)
     amplitude = sum(each.amplitude for each in found.responses) / len(found.responses)
     unit = f", {units.response_name}" if rig else ""

@@ -68,7 +68,7 @@ def plot_damping_along(
     thresholds: Sequence[tuple[str, float]],
     *,
     along: str,
-    with_rig: bool,
+    units: tuple[str, str],
     label: str,
     title: str = "",
     ax: Axes | None = None,
@@ -83,8 +83,8 @@ def plot_damping_along(
         Where the mode neither grows nor decays, and on which side it decays.
     along : {"speed", "rate"}
         What the values are.
-    with_rig : bool
-        Whether they are in rpm or m/h, and the damping in SI.
+    units : (str, str)
+        Of the values and of the damping; empty where dimensionless.
     label, title : str
         Name of the mode; where that is.
     ax : Axes, optional
@@ -92,9 +92,10 @@ def plot_damping_along(
     """
     ax = new_axes(6.4, 4.2) if ax is None else ax
     known = np.isfinite(damping) & np.isfinite(errors)
-    name, unit = {
-        "speed": ("rotary speed", "rpm") if with_rig else ("rotary speed ω0", ""),
-        "rate": ("rate of penetration", "m/h") if with_rig else ("rate of penetration", ""),
+    unit, response = units
+    name = {
+        "speed": "rotary speed" if unit else "rotary speed ω0",
+        "rate": "rate of penetration",
     }[along]
     ax.axhline(0.0, color=GREY, linewidth=0.8)
     ax.errorbar(
@@ -113,7 +114,7 @@ def plot_damping_along(
         room = 0.15 * max(float(np.ptp(shown)), float(np.abs(shown).max()))
         ax.set_ylim(min(float(shown.min()), 0.0) - room, max(float(shown.max()), 0.0) + room)
     ax.set_xlabel(axis_name(name, unit))
-    ax.set_ylabel(axis_name("damping left to the mode", "N·m·s/rad" if with_rig else ""))
+    ax.set_ylabel(axis_name("damping left to the mode", response))
     if title:
         ax.set_title(title, fontsize="medium")
     ax.legend(fontsize="small")
@@ -125,7 +126,7 @@ def plot_response(
     values: ComplexArray,
     errors: FloatArray,
     model: tuple[FloatArray, ComplexArray],
-    with_rig: bool,
+    unit: str,
     label: str,
     ax: Axes | None = None,
 ) -> Axes:
@@ -137,8 +138,8 @@ def plot_response(
         Hz or ω; H; and its error, infinite where it is not known.
     model : tuple of frequencies and values
         Of the rational model.
-    with_rig : bool
-        Whether they are in rig units.
+    unit : str
+        Of H; empty where all is dimensionless, else frequencies are in Hz.
     label : str
         What is drawn.
     ax : Axes, optional
@@ -154,8 +155,8 @@ def plot_response(
         )  # fmt: skip
         ax.plot(model[0], getattr(model[1], part), color=colour, linewidth=1.1)
     ax.set_xscale("log")
-    cycles, unit = ("Hz", "N·m·s/rad") if with_rig else ("", "")
-    ax.set_xlabel(axis_name("frequency" if with_rig else "frequency ω", cycles))
+    cycles = "Hz" if unit else ""
+    ax.set_xlabel(axis_name("frequency" if unit else "frequency ω", cycles))
     ax.set_ylabel(axis_name("H, torque of the bit per speed", unit))
     ax.set_title(f"the bit's answer, {label}; lines: rational model", fontsize="medium")
     ax.legend(fontsize="small")

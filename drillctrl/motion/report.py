@@ -11,7 +11,7 @@ from drillctrl.base.text import finite_or_none
 from drillctrl.motion.orbit import AxialOrbit
 from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
-from drillctrl.motion.units import Units, units_of
+from drillctrl.motion.units import Units, told_units, units_of
 
 
 def motion_fields(
@@ -132,7 +132,7 @@ def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
 
 def motion_summary(found: DrillingMotion) -> str:
     """Return what is told on a terminal."""
-    units = units_of(found.case)
+    units = told_units(found.case)
     lines = [_orbit_text(found.orbit, units)]
     for swing in found.modes:
         lines += ["", *_mode_lines(swing, units)]
@@ -160,7 +160,7 @@ def _orbit_told(orbit: AxialOrbit, units: Units) -> str:
     loads = ""
     if units.rate_name:
         weight, torque = orbit.weight * units.weight, orbit.torque * units.torque
-        loads = f" ({weight / 1e3:.3g} kN, {torque / 1e3:.3g} kN·m)"
+        loads = f" ({weight:.3g} {units.weight_name}, {torque:.3g} {units.torque_name})"
     return (
         f"Axial orbit at steady rotation: {kind}; held {orbit.held:.0%} of the time, off the rock "
         f"{orbit.lifted:.0%}; cuts up to {orbit.deepest:.2f} of smooth drilling; mean weight "
@@ -226,7 +226,7 @@ def verdict(swing: ModeSwing) -> list[str]:
 
 def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
     """Return what is told of H at frequencies of one's own on a terminal."""
-    units = units_of(found.case)
+    units = told_units(found.case)
     rig = bool(units.rate_name)
     lines = [
         _orbit_text(found.orbit, units),

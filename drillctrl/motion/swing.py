@@ -16,7 +16,7 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
-from drillctrl.drilling.quantities import si_scale
+from drillctrl.drilling.quantities import response_scale
 from drillctrl.motion.crossings import sign_changes
 from drillctrl.motion.orbit import AxialOrbit, axial_orbit
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, BitResponse, bit_response
@@ -167,14 +167,14 @@ class DrillingMotion:
         from drillctrl.motion.figure import plot_damping
 
         mode = checked_integer("mode", mode, 1, len(self.modes))
-        swing, rig = self.modes[mode - 1], self.case.rig
-        scale = 1.0 if rig is None else si_scale("torque", rig) * rig.time_scale
+        swing = self.modes[mode - 1]
+        scale, unit = response_scale(self.case.told_rig, self.case.language)
         return plot_damping(
             swing.amplitudes,
             swing.damping_left * scale,
             np.array([each.response.error for each in swing.at]) * scale,
             [(crossing.kind, crossing.amplitude) for crossing in swing.crossings],
-            "" if rig is None else "N·m·s/rad",
+            unit,
             f"torsional mode {swing.mode.number}",
             ", ".join(text for text in (name, self.case.place) if text),
         )

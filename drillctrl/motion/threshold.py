@@ -15,7 +15,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import changed_by
-from drillctrl.drilling.quantities import si_scale
+from drillctrl.drilling.quantities import response_scale, si_scale
 from drillctrl.motion.crossings import sign_changes
 from drillctrl.motion.response import FEWEST_PERIODS
 from drillctrl.motion.swing import ModeAt, mode_at
@@ -93,6 +93,20 @@ class ModeAlong:
         return float(self.values[0] / self.factors[0])
 
     @property
+    def told(self) -> tuple[float, str]:
+        """How many units that are told one of `values` is, and that unit; it may be empty."""
+        case, here = self.case, self.case.rig_point
+        quantity, si = {
+            "speed": ("angular_rate", math.pi / 30.0),
+            "rate": ("axial_rate", 1.0 / 3600.0),
+        }[self.along]
+        if case.language.units:
+            return case.language.number(quantity, si), case.language.unit(quantity)
+        if here is None:
+            return 1.0, ""
+        return si / si_scale(quantity, here.rig), ""
+
+    @property
     def damping_left(self) -> FloatArray:
         """Own damping and Re H, (k,)."""
         return np.asarray(self.own_damping + [each.response.value.real for each in self.at])
@@ -110,7 +124,7 @@ class ModeAlong:
         """Return what is the same throughout, for titles."""
         parts = self.case.place.split(", ")
         changed = {0} if self.along == "speed" else {1}
-        if self.case.rig_point is None and self.along == "speed":
+        if self.case.told_rig is None and self.along == "speed":
             # The depth of cut changes as well.
             changed = {0, 1}
         return [part for i, part in enumerate(parts) if i not in changed]
@@ -125,15 +139,15 @@ class ModeAlong:
         """
         from drillctrl.motion.figure import plot_damping_along
 
-        rig = self.case.rig
-        scale = 1.0 if rig is None else si_scale("torque", rig) * rig.time_scale
+        scale, response = response_scale(self.case.told_rig, self.case.language)
+        factor, unit = self.told
         return plot_damping_along(
-            self.values,
+            factor * self.values,
             self.damping_left * scale,
             np.array([each.response.error for each in self.at]) * scale,
-            [(t.decays, t.factor * self.own_value) for t in self.thresholds],
+            [(t.decays, factor * t.factor * self.own_value) for t in self.thresholds],
             along=self.along,
-            with_rig=rig is not None,
+            units=(unit, response),
             label=f"torsional mode {self.number}",
             title=", ".join(text for text in (name, *self._held) if text),
         )

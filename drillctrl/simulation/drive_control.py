@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -142,7 +143,7 @@ def law_controller(
     case = as_case(where, asking_plant(rig, control, bit))
     time = rig.time_scale
     return case, Controller(
-        LAW_LOOP,
+        replace(LAW_LOOP, name=control.name),
         [1.0],
         [0.0],
         limit=_spare_torque(case, machine, rig.torsional_stiffness),

@@ -10,9 +10,10 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
+from drillctrl.base.language import FIELD
 from drillctrl.base.tableio import csv_text
 from drillctrl.simulation.result import Simulation
-from drillctrl.simulation.rig_units import SI_UNITS
+from drillctrl.simulation.rig_units import QUANTITIES, SI_UNITS
 
 ENDINGS = (".csv", ".npz", ".parquet")
 _MOST_ROWS = 10_000_000
@@ -41,7 +42,8 @@ def _instants(end: float, every: float) -> FloatArray:
 def export_motion(simulation: Simulation, path: str | Path, every: float | None = None) -> None:
     """Write the motion, whole or not at all.
 
-    That of a rig is written in SI units, any other dimensionless.
+    That of a rig is written in SI units, or those of the field where its point says so; any other
+    dimensionless.
 
     Parameters
     ----------
@@ -63,14 +65,18 @@ def export_motion(simulation: Simulation, path: str | Path, every: float | None 
     """
     check_export_path(path)
     times = None if every is None else _instants(float(simulation.times[-1]), every)
-    rig = simulation.rig
+    rig, language = simulation.case.told_rig, simulation.case.language
     if rig is None:
         motion = simulation.motion if times is None else simulation.at(times)
         columns, units = motion.columns(), "dimensionless"
     else:
         seconds = None if times is None else times * rig.time_scale
-        columns = simulation.in_rig_units(seconds).columns()
-        units = ", ".join(f"{name} in {unit}" for name, unit in SI_UNITS.items())
+        columns, names = simulation.in_rig_units(seconds).columns(), dict(SI_UNITS)
+        if language is FIELD:
+            for name, quantity in QUANTITIES.items():
+                columns[name] = language.number(quantity, 1.0) * columns[name]
+                names[name] = language.unit(quantity)
+        units = ", ".join(f"{name} in {unit}" for name, unit in names.items())
     ending = Path(path).suffix.lower()
     with replacing(path) as file:
         if ending == ".npz":

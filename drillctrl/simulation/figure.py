@@ -18,7 +18,7 @@ from drillctrl.base.figure import (
     new_axes,
     new_figure,
 )
-from drillctrl.drilling.quantities import field_scale
+from drillctrl.drilling.quantities import told_scale
 from drillctrl.simulation.rock_face import rock_face
 from drillctrl.simulation.trace import Trace
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from drillctrl.drilling.rig import Rig
+    from drillctrl.drilling.case import Case
 
 # Column of the motion → its name, its symbol, and what it measures.
 SIGNALS = {
@@ -41,6 +41,7 @@ SIGNALS = {
     "torque_on_bit": ("torque on bit", "", "torque"),
     "axial": ("axial control", "", "force"),
     "torque": ("control torque", "u", "torque"),
+    "drive": ("torque of the drive", "u", "torque"),
 }
 PLANES = {"torsion": ("theta", "dtheta"), "axial": ("x", "dx")}
 _SHADES = (
@@ -66,7 +67,7 @@ class Scale(NamedTuple):
     label: str
 
 
-def scale_of(rig: Rig | None, name: str) -> Scale:
+def scale_of(case: Case, name: str) -> Scale:
     """Return how a column of the motion, or ``time``, is drawn: in a rig's units if there is one.
 
     States that are not the bit's are drawn as they are.
@@ -74,7 +75,7 @@ def scale_of(rig: Rig | None, name: str) -> Scale:
     words, symbol, quantity = {**SIGNALS, "time": ("time", "t", "time")}.get(
         name, (name, "", "number")
     )
-    factor, unit = field_scale(quantity, rig)
+    factor, unit = told_scale(quantity, case.told_rig, case.language)
     return Scale(factor, axis_name(words if unit else f"{words} {symbol}".rstrip(), unit))
 
 
@@ -100,7 +101,7 @@ def plot_motion(run: Trace, inputs: Sequence[str] = (), title: str | None = None
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         axes[0].legend(handles, labels, loc="upper left", fontsize="small")
-    axes[-1].set_xlabel(scale_of(run.case.rig, "time").label)
+    axes[-1].set_xlabel(scale_of(run.case, "time").label)
     axes[0].set_title(headline(title or title_of(run), 80), fontsize="medium")
     return figure
 
@@ -118,7 +119,7 @@ def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
         By default new ones.
     """
     values, times = _signal(run, name)
-    unit = scale_of(run.case.rig, "time").factor
+    unit = scale_of(run.case, "time").factor
     ax = new_axes(7.2, 2.8) if ax is None else ax
     for phase, label, colour, alpha in _SHADES:
         for i, (start, end) in enumerate(run.phases(phase) if run.model == "nonlinear" else ()):
@@ -126,8 +127,8 @@ def plot_signal(run: Trace, name: str = "x", ax: Axes | None = None) -> Axes:
             ax.axvspan(unit * start, unit * end, color=colour, alpha=alpha, linewidth=0, label=told)
     colour = ORANGE if name in run.input_names else BLUE
     ax.plot(times, values, color=colour, linewidth=0.9)
-    ax.set_xlabel(scale_of(run.case.rig, "time").label)
-    ax.set_ylabel(scale_of(run.case.rig, name).label)
+    ax.set_xlabel(scale_of(run.case, "time").label)
+    ax.set_ylabel(scale_of(run.case, name).label)
     ax.margins(x=0)
     return ax
 
@@ -160,7 +161,7 @@ def plot_phase_portrait(
     ax = new_axes(5.2, 4.4) if ax is None else ax
     motion = run.on_steps(_PER_STEP)
     early = motion.times <= since
-    right, high = scale_of(run.case.rig, across), scale_of(run.case.rig, up)
+    right, high = scale_of(run.case, across), scale_of(run.case, up)
     x, y = right.factor * getattr(motion, across), high.factor * getattr(motion, up)
     if early.any():
         ax.plot(x[early], y[early], color=GREY, alpha=0.5, linewidth=0.6, label="before")
@@ -215,8 +216,8 @@ def plot_against_linear(
     reach = high - low
     if other.min() < low - reach or other.max() > high + reach:
         ax.set_ylim(low - reach, high + reach)
-    ax.set_xlabel(scale_of(nonlinear.case.rig, "time").label)
-    ax.set_ylabel(scale_of(nonlinear.case.rig, name).label)
+    ax.set_xlabel(scale_of(nonlinear.case, "time").label)
+    ax.set_ylabel(scale_of(nonlinear.case, name).label)
     ax.margins(x=0)
     words = SIGNALS.get(name, (name,))[0]
     told = f"{words[:1].upper()}{words[1:]} at {nonlinear.case.place}"
@@ -245,8 +246,10 @@ def plot_rock_face(
     when = float(run.times[-1]) if time is None else time
     face = rock_face(run, when, 361)
     degrees = np.degrees(face.angle)
-    rig = run.case.rig
-    (length, unit), (duration, second) = (field_scale(q, rig) for q in ("length", "time"))
+    told_rig, language = run.case.told_rig, run.case.language
+    (length, unit), (duration, second) = (
+        told_scale(quantity, told_rig, language) for quantity in ("length", "time")
+    )
     height = length * face.height
     bottom = min(float(height.min()), 0.0) - 0.2 * max(float(np.ptp(height)), 1e-9)
     ax.fill_between(degrees, bottom, height, color=GREY, alpha=0.35, linewidth=0)
@@ -272,7 +275,7 @@ def _signal(run: Trace, name: str) -> tuple[Any, Any]:
     known = ["bit_speed", *run.column_names]
     if name not in known:
         raise InputError("signal", name, f"one of {', '.join(known)}")
-    unit, factor = scale_of(run.case.rig, "time").factor, scale_of(run.case.rig, name).factor
+    unit, factor = scale_of(run.case, "time").factor, scale_of(run.case, name).factor
     read = "dtheta" if name == "bit_speed" else name
     motion = run.on_steps(_PER_STEP, names=(read,))
     mean = run.point.omega0 if name == "bit_speed" else 0.0

@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base import units
 from drillctrl.base.text import set_out, wrapped
+from drillctrl.drilling.quantities import told_scale
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
@@ -150,12 +151,13 @@ def _ended(run: Simulation) -> str:
 
 
 def _seconds(run: Simulation, time: float) -> str:
-    return "" if run.rig is None else f" = {time * run.rig.time_scale:.4g} s"
+    told = run.case.told_rig
+    return "" if told is None else f" = {time * told.time_scale:.4g} s"
 
 
 def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> str:
     """Return the summary of a run for people, in rig units too where it was of a rig."""
-    s, p, rig = run.summary, run.point, run.rig
+    s, p, rig = run.summary, run.point, run.case.told_rig
     least, most = (_near_zero(v, 1e-9 * p.omega0) for v in (s.bit_speed_min, s.bit_speed_max))
     lowest, highest = (_near_zero(v, run.resolved) for v in (s.axial_min, s.axial_max))
     speed = ""
@@ -180,13 +182,13 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     if s.lost_contact:
         kinds.append("the bit leaves the rock")
     lines = [
+        ("Outcome", _outcome_text(run)),
         *([] if rig is None else [("Drilling", run.case.place)]),
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
         ("Run", f"{run.model} model, {run.duration:g} time units"
          f"{_seconds(run, run.duration)}, {_ended(run)}"),
         *([] if run.status == Status.DONE else [("", str(run.status.sentence))]),
         *_chatter_lines(run),
-        ("Outcome", _outcome_text(run)),
         ("Motion", motion),
         ("", ", ".join(kinds) if kinds else "no stick, contact kept"),
     ]  # fmt: skip
@@ -195,16 +197,17 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         lines.append(("Multipliers", f"{values} (1 found within {multipliers.trivial_error:.0e})"))
     lines += [
         ("Bit speed", f"{speed}{least:.6g} to {most:.6g}"),
-        ("Axial", f"{_millimetres(run, lowest, highest)}x from {lowest:.6g} to {highest:.6g}"),
+        ("Axial", f"{_length_text(run, lowest, highest)}x from {lowest:.6g} to {highest:.6g}"),
         *_load_lines(run),
         *_backwards_lines(run),
         ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
     ]
     if run.controller is not None:
         torque = ""
-        if rig is not None and run.controller.feedback.inputs == ("torque",):  # type: ignore[union-attr]
+        driven = run.controller.feedback.inputs  # type: ignore[union-attr]
+        if rig is not None and driven in (("torque",), ("drive",)):
             newton_metres = s.max_abs_u * rig.torsional_stiffness
-            torque = f" = {units.from_si(newton_metres, units.TORQUE, 'kN*m'):.4g} kN·m"
+            torque = f" = {run.case.language.text('torque', newton_metres)}"
         share = _saturated(run)
         limited = f", at a limit for {share:.1%} of the run" if share else ""
         lines.append(("Control", f"largest |u| = {s.max_abs_u:.6g}{torque}{limited}"))
@@ -233,11 +236,12 @@ def _cell(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
 
 
-def _millimetres(run: Simulation, *axial: float) -> str:
-    if run.rig is None:
+def _length_text(run: Simulation, *axial: float) -> str:
+    factor, unit = told_scale("length", run.case.told_rig, run.case.language)
+    if not unit:
         return ""
-    low, high = (1e3 * run.rig.axial_scale * x for x in axial)
-    return f"{low:.4g} to {high:.4g} mm = "
+    low, high = (factor * x for x in axial)
+    return f"{low:.4g} to {high:.4g} {unit} = "
 
 
 def _complex(value: complex) -> str:

@@ -21,6 +21,7 @@ from drillctrl.simulation.rock_face import RockFace, rock_face
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.summary import Summary, summarise
 from drillctrl.simulation.trace import Trace
+from drillctrl.strings.drive_law import LAW
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,10 +127,16 @@ class Simulation(Trace):
             return "without control"
         feedback = self.controller.feedback
         assert isinstance(feedback, FeedbackStructure)
+        if feedback.outputs == (LAW,):
+            # Its gains are in the plant.
+            return f"top drive: {feedback.name}"
         _, K1, K2 = self.controller.gain_sets()
         plant, _ = self.case.physics("a simulation")
         later = ", later others" if len(K1) > 1 else ""
-        return control_text(feedback, K1[0], K2[0], plant, self.rig) + later
+        return (
+            control_text(feedback, K1[0], K2[0], plant, self.case.told_rig, self.case.language)
+            + later
+        )
 
     def plot(self, name: str | None = None) -> Figure:
         """Draw axial motion, bit speed and control over time; see `plot_motion`.

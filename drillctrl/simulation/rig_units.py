@@ -29,6 +29,20 @@ SI_UNITS = {
     "axial_force": "N",
     "control_torque": "N m",
 }
+# What they measure, for other units than these.
+QUANTITIES = {
+    "times": "time",
+    "axial_displacement": "length",
+    "penetration_rate": "axial_rate",
+    "angular_displacement": "angle",
+    "bit_speed": "angular_rate",
+    "delay": "time",
+    "depth_of_cut": "length",
+    "weight_on_bit": "force",
+    "torque_on_bit": "torque",
+    "axial_force": "force",
+    "control_torque": "torque",
+}
 
 
 @dataclass(frozen=True, eq=False)

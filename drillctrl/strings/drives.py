@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
@@ -78,19 +79,28 @@ class DriveComparison:
         ]
         return csv_text(list(rows[0]), ([str(v) for v in row.values()] for row in rows))
 
-    def summary(self) -> str:
-        """Return a table for people."""
-        return comparison_summary(self.rig, self.falling, self.drives)
+    def summary(self, units: str = "si") -> str:
+        """Return a table for people, in the units of ``"si"`` or ``"field"``."""
+        language = told_language(units)
+        return comparison_summary(self.rig, self.falling, self.drives, language)
 
-    def plot(self) -> Figure:
-        """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`."""
+    def plot(self, name: str | None = None) -> Figure:
+        """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the rig, for the title.
+        """
         from drillctrl.strings.drives_figure import plot_drives
 
         curves = {
             drive.control.name: (drive.frequencies, drive.reflection, drive.impedance, drive.roots)
             for drive in self.drives
         }
-        return plot_drives(curves, self.rig.string.torsion.wave_impedance)
+        length = f"{self.rig.string.length:.6g} m of string, free bit"
+        title = length if name is None else f"{name}, {length}"
+        return plot_drives(curves, self.rig.string.torsion.wave_impedance, title)
 
 
 @checks_kinds

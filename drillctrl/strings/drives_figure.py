@@ -19,7 +19,7 @@ Curves = tuple[FloatArray, FloatArray, ComplexArray, Iterable[DriveRoot]]
 _COLOURS = (GREY, BLUE, GREEN, ORANGE, "#CC79A7", "#56B4E9", "#E69F00")
 
 
-def plot_drives(drives: Mapping[str, Curves], pipe: float) -> Figure:
+def plot_drives(drives: Mapping[str, Curves], pipe: float, title: str = "") -> Figure:
     """Draw ``|r|``, ``|Z|`` and Re Z over ζ, and the damping of modes with a free bit.
 
     Parameters
@@ -28,8 +28,11 @@ def plot_drives(drives: Mapping[str, Curves], pipe: float) -> Figure:
         Name → frequencies in Hz, ``|r|``, Z in N m s/rad, and roots.
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
+    title : str
+        Whose string it is.
     """
-    figure = new_figure(7.0, 8.0)
+    figure = new_figure(7.0, 9.0)
+    figure.suptitle(title, fontsize="medium")
     returned, impedance, damping = figure.subplots(3, 1, sharex=True)
     grows = False
     for i, (name, (frequencies, reflection, z, roots)) in enumerate(drives.items()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from drillctrl.base.language import SI, Language
 from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
@@ -17,12 +18,16 @@ _COLUMN = 11
 
 
 def comparison_summary(
-    rig: StringRig, falling: FallingTorque, drives: Sequence[DriveMeasures]
+    rig: StringRig,
+    falling: FallingTorque,
+    drives: Sequence[DriveMeasures],
+    language: Language = SI,
 ) -> str:
     """Return a table, a column for each drive."""
     line, machine = rig.string.torsion, rig.drive
     assert machine is not None
-    drop, decay = falling.drop / 1e3, _rpm(falling.decay)
+    drop, decay = language.text("torque", falling.drop, 3), _rpm(falling.decay)
+    per, slope = language.number("impedance", 1.0), language.unit("impedance").removesuffix("/rad")
     first = drives[0].modes
     rows: list[tuple[str, list[str]]] = [("", [drive.control.name for drive in drives])]
 
@@ -32,9 +37,9 @@ def comparison_summary(
             name = f"  {_ordinal(i + 1)} torsional, {mode.slope.mode_frequency:.3f} Hz"
             rows.append((name, [value(drive, i) for drive in drives]))
 
-    by_mode("Critical slope, N·m·s", lambda drive, i: f"{drive.modes[i].slope.slope:.4g}")
-    rows.append(("  smallest", [f"{drive.smallest_slope:.4g}" for drive in drives]))
-    rows.append((f"  weakest of all to {HIGHEST:g} Hz", [_weakest(drive) for drive in drives]))
+    by_mode(f"Critical slope, {slope}", lambda drive, i: f"{per * drive.modes[i].slope.slope:.4g}")
+    rows.append(("  smallest", [f"{per * drive.smallest_slope:.4g}" for drive in drives]))
+    rows.append((f"  weakest of all to {HIGHEST:g} Hz", [_weakest(drive, per) for drive in drives]))
     rows.append(("    at, Hz", [_where(drive) for drive in drives]))
     by_mode("|r| of the drive", lambda drive, i: f"{drive.modes[i].reflection:.3f}")
     by_mode("Damping, % of critical", _damping)
@@ -48,11 +53,11 @@ def comparison_summary(
     width = max(len(label) for label, _ in rows) + 2
     columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
     head = [
-        f"{rig.string.length:.6g} m of string, {line.wave_impedance:.4g} N·m·s of the"
-        " uppermost pipe,",
-        drive_text(machine),
+        f"{language.text('depth', rig.string.length, 6)} of string, "
+        f"{per * line.wave_impedance:.4g} {slope} of the uppermost pipe,",
+        drive_text(machine, language),
         "Critical slope: by which the bit's torque may fall per unit of its speed.",
-        f"Threshold: for a torque that falls by {drop:.3g} kN·m over {decay:.3g} rpm.",
+        f"Threshold: for a torque that falls by {drop} over {decay:.3g} rpm.",
         "",
     ]
     table = [
@@ -62,10 +67,10 @@ def comparison_summary(
     return "\n".join([*head, *table])
 
 
-def _weakest(drive: DriveMeasures) -> str:
+def _weakest(drive: DriveMeasures, per: float) -> str:
     if not drive.stable:
         return "0"
-    return "any" if drive.weakest is None else f"{drive.weakest.slope:.4g}"
+    return "any" if drive.weakest is None else f"{per * drive.weakest.slope:.4g}"
 
 
 def _where(drive: DriveMeasures) -> str:
@@ -95,6 +100,30 @@ def _ordinal(number: int) -> str:
     endings = {1: "st", 2: "nd", 3: "rd"}
     teen = number % 100 in (11, 12, 13)
     return f"{number}{'th' if teen else endings.get(number % 10, 'th')}"
+
+
+def drive_settings(control: DriveControl, language: Language) -> list[tuple[str, str]]:
+    """Return the parameters of a law in the words of a drive: P and I, else the law in SI."""
+    integral, rest = without_integral(control.speed)
+    if control.torque or len(rest.denominator) > 1 or len(rest.numerator) > 2:
+        return [("law, SI units", law_text(control))]
+    gains = [part / rest.denominator[0] for part in rest.numerator]
+    rows = [
+        ("P", language.text("drive_impedance", gains[-1], 3)),
+        ("I", language.text("drive_stiffness", integral, 3)),
+    ]
+    if len(gains) == 2 and gains[0]:
+        rows.append(("compensated inertia", language.text("inertia", -gains[0], 3)))
+    return rows
+
+
+def setting_sentence(control: DriveControl, language: Language) -> str:
+    """Say what to set of a drive."""
+    rows = drive_settings(control, language)
+    if rows[0][0] != "P":
+        return f"Run the drive under {control.name}, whose law is written out below."
+    settings = ", ".join(f"{name} to {value}" for name, value in rows)
+    return f"Set {settings} of the drive ({control.name})."
 
 
 def law_text(control: DriveControl) -> str:

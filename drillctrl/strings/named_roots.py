@@ -11,6 +11,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import SI, Language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.strings.at_bit import fed_by_weight
@@ -86,15 +87,15 @@ class NamedRoot:
             "amplitudes": (amplitudes / np.abs(mode.shape).max()).tolist(),
         }
 
-    @property
-    def text(self) -> str:
-        """Name, frequency, damping and critical slope."""
+    def text(self, language: Language) -> str:
+        """Return name, frequency, damping and critical slope."""
         ratio = self.damping_ratio
         damped = "absorbed" if ratio is None else f"{1e2 * ratio:.3g} %"
         told = f"{self.mode.name}: {self.frequency:.4g} Hz, {damped}"
         if self.critical_slope is None:
             return told
-        return f"{told}, critical slope {self.critical_slope:.4g} N·m·s"
+        slope = language.text("impedance", self.critical_slope).removesuffix("/rad")
+        return f"{told}, critical slope {slope}"
 
 
 @dataclass(frozen=True)
@@ -109,11 +110,14 @@ class NamedRoots:
         What turns the string.
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
+    language : Language
+        With units, in which they are told.
     """
 
     roots: tuple[NamedRoot, ...]
     control: DriveControl | None
     pipe: float
+    language: Language = SI
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields ``modes``, and ``drive`` and ``reflection`` under a drive."""
@@ -132,15 +136,15 @@ class NamedRoots:
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
         named = [("Modes", "the least damped root of each, damping in % of critical")]
-        named += [("", root.text) for root in self.roots]
-        named += _still(self.roots)
+        named += [("", root.text(self.language)) for root in self.roots]
+        named += _still(self.roots, self.language)
         if self.control is None:
             return named
         return [("Drive", self.control.name), *named]
 
 
-def _still(roots: tuple[NamedRoot, ...]) -> list[tuple[str, str]]:
-    """Return where the first modes of each kind with any nodes stand still, as metres down."""
+def _still(roots: tuple[NamedRoot, ...], language: Language) -> list[tuple[str, str]]:
+    """Return where the first modes of each kind with any nodes stand still, as depths."""
     told = []
     for root in roots:
         mode = root.mode
@@ -152,7 +156,8 @@ def _still(roots: tuple[NamedRoot, ...]) -> list[tuple[str, str]]:
         at = np.flatnonzero(np.signbit(shape[1:-1]) != np.signbit(shape[2:])) + 1
         share = shape[at] / (shape[at] - shape[at + 1])
         depths = places[at] + share * (places[at + 1] - places[at])
-        told.append(f"{mode.name}: still {', '.join(f'{d:.0f}' for d in depths)} m down")
+        metres = ", ".join(f"{language.number('depth', depth):.0f}" for depth in depths)
+        told.append(f"{mode.name}: still {metres} {language.unit('depth')} down")
     return [("Shapes" if i == 0 else "", text) for i, text in enumerate(told)]
 
 
@@ -218,7 +223,8 @@ def named_roots(
         for mode, root in _by_mode(loop, modes, axial=kind == "axial"):
             slope = slopes.get(mode.number) if kind == "torsional" else None
             found.append(NamedRoot(mode, root, slope))
-    return NamedRoots(tuple(found), control, string.torsion.wave_impedance)
+    language = case.language if case.language.units else SI
+    return NamedRoots(tuple(found), control, string.torsion.wave_impedance, language)
 
 
 def _stiffness(control: DriveControl) -> Callable[[ComplexArray], ComplexArray]:

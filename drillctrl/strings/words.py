@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from drillctrl.drilling.rig import STANDARD_GRAVITY
+from drillctrl.base.language import FIELD, SI, Language
+from drillctrl.drilling.rig import STANDARD_GRAVITY, Rig
 from drillctrl.strings.check import Mode, RigCheck
 from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.rig import StringRig, lump
@@ -12,9 +13,9 @@ from drillctrl.strings.section import Section
 _TOLD = 6
 
 
-def rig_summary(found: RigCheck) -> str:
+def rig_summary(found: RigCheck, language: Language = SI) -> str:
     """Return what is understood of a rig, for people, in 80 columns."""
-    rig = found.rig
+    rig, say = found.rig, language.text
     lumped = lump(rig)
     lines: list[tuple[str, str]] = []
     if isinstance(rig, StringRig):
@@ -22,27 +23,28 @@ def rig_summary(found: RigCheck) -> str:
         assert found.weight_in_air is not None
         assert found.buoyed_weight is not None
         lines += [
-            ("String", f"{string.length:.6g} m, {found.weight_in_air / 1e3:.5g} kN in air"
-             f" = {found.weight_in_air / STANDARD_GRAVITY / 1e3:.4g} t"),
-            ("", f"{found.buoyed_weight / 1e3:.5g} kN in mud of {string.mud_density:.5g} kg/m³"
-             if string.mud_density else "no mud"),
-            ("Top end", _top_end(rig)),
-            ("Impedance", f"{found.impedance:.5g} N·m·s of the uppermost pipe in torsion"),
+            ("String", f"{say('depth', string.length, 6)}, {say('force', found.weight_in_air, 5)}"
+             f" in air{_mass(found.weight_in_air / STANDARD_GRAVITY, language)}"),
+            ("", f"{say('force', found.buoyed_weight, 5)} in mud of"
+             f" {say('density', string.mud_density, 5)}" if string.mud_density else "no mud"),
+            ("Top end", _top_end(rig, language)),
+            ("Impedance", f"{_impedance(found, language)} of the uppermost pipe in torsion"),
             ("Damping", f"torsional {damping.torsional:g} 1/s, axial {damping.axial:g} 1/s,"
              f" Kelvin-Voigt {1e3 * damping.retardation:g} ms"),
         ]  # fmt: skip
         for i, section in enumerate(string.sections):
-            lines.append(("Sections" if not i else "", _section_text(section)))
-    mm = 1e3 * rig.bit_radius
+            lines.append(("Sections" if not i else "", _section_text(section, language)))
     lines += [
-        ("Bit", f"{2 * mm:.5g} mm = {2 * mm / 25.4:.4g} in, {rig.blades} blades, wear flat"
-         f" {1e3 * rig.wearflat_length:.4g} mm"),
-        ("Rock", f"strength {rig.rock_strength / 1e6:.5g} MPa, contact"
-         f" {rig.contact_strength / 1e6:.5g} MPa"),
-        ("Lumped", f"axial {lumped.mass / 1e3:.5g} t on {lumped.axial_stiffness / 1e3:.5g} kN/m,"
-         f" {lumped.axial_damping / 1e3:.4g} kN·s/m"),
-        ("", f"torsional {lumped.inertia:.5g} kg·m² on {lumped.torsional_stiffness:.5g} N·m/rad,"
-         f" {lumped.torsional_damping:.4g} N·m·s/rad"),
+        ("Bit", f"{_bit_size(rig, language)}, {rig.blades} blades, wear flat"
+         f" {say('length', rig.wearflat_length)}"),
+        ("Rock", f"strength {say('stress', rig.rock_strength, 5)}, contact"
+         f" {say('stress', rig.contact_strength, 5)}"),
+        ("Lumped", f"axial {say('mass', lumped.mass, 5)} on"
+         f" {say('axial_stiffness', lumped.axial_stiffness, 5)},"
+         f" {say('axial_damping', lumped.axial_damping)}"),
+        ("", f"torsional {say('inertia', lumped.inertia, 5)} on"
+         f" {say('torsional_stiffness', lumped.torsional_stiffness, 5)},"
+         f" {say('impedance', lumped.torsional_damping)}"),
         ("Modes", "top end held, bit free; damping in % of critical"),
     ]  # fmt: skip
     for kind, modes in (("torsional", found.torsional), ("axial", found.axial)):
@@ -51,28 +53,49 @@ def rig_summary(found: RigCheck) -> str:
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
 
 
-def _top_end(rig: StringRig) -> str:
-    turned = "speed imposed" if rig.drive is None else drive_text(rig.drive)
+def _mass(value: float, language: Language) -> str:
+    """Return a mass beside a weight; in pounds they are one number."""
+    return "" if language is FIELD else f" = {language.text('mass', value)}"
+
+
+def _impedance(found: RigCheck, language: Language) -> str:
+    assert found.impedance is not None
+    return language.text("impedance", found.impedance, 5).removesuffix("/rad")
+
+
+def _bit_size(rig: Rig, language: Language) -> str:
+    told = language.text("length", 2.0 * rig.bit_radius, 5)
+    # Bits are sold by the inch.
+    return told if language is FIELD else f"{told} = {FIELD.text('length', 2.0 * rig.bit_radius)}"
+
+
+def _top_end(rig: StringRig, language: Language) -> str:
+    turned = "speed imposed" if rig.drive is None else drive_text(rig.drive, language)
     ropes = rig.string.hoisting_stiffness
-    fed = "feed imposed" if ropes is None else f"ropes of {ropes / 1e3:.5g} kN/m"
+    fed = "feed imposed"
+    if ropes is not None:
+        fed = f"ropes of {language.text('axial_stiffness', ropes, 5)}"
     if rig.weight_control is not None:
-        gain = rig.weight_control.feed_gain * 3.6e6
-        fed = f"fed by weight, {gain:.3g} m/h per kN"
+        gain = language.text("axial_rate", 1e3 * rig.weight_control.feed_gain, 3)
+        fed = f"fed by weight, {gain} per kN"
     return f"{turned}, {fed}"
 
 
-def drive_text(drive: DriveMachine) -> str:
+def drive_text(drive: DriveMachine, language: Language = SI) -> str:
     """Return what a drive is."""
-    told = f"top drive of {drive.inertia:g} kg·m² at the string"
+    told = f"top drive of {language.text('inertia', drive.inertia, 6)} at the string"
     if drive.torque_limit is not None:
-        told += f", at most {drive.torque_limit / 1e3:.4g} kN·m"
+        told += f", at most {language.text('torque', drive.torque_limit)}"
     times = (("delay", drive.delay), ("lag", drive.lag), ("encoder", drive.encoder))
     return told + "".join(f", {name} {1e3 * time:.3g} ms" for name, time in times if time)
 
 
-def _section_text(section: Section) -> str:
-    size = f"{1e3 * section.outer_diameter:.4g} × {1e3 * section.inner_diameter:.4g} mm"
-    told = f"{section.name}: {section.length:.6g} m, {size}, {section.mass_per_metre:.4g} kg/m"
+def _section_text(section: Section, language: Language) -> str:
+    say = language.text
+    outer = f"{language.number('length', section.outer_diameter):.4g}"
+    told = f"{section.name}: {say('depth', section.length, 6)},"
+    told += f" {outer} × {say('length', section.inner_diameter)},"
+    told += f" {say('linear_density', section.mass_per_metre)}"
     return told if section.tool_joint is None else f"{told}, {section.joints} joints"
 
 

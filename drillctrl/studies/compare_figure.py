@@ -17,6 +17,7 @@ from drillctrl.studies.measures import Response
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from drillctrl.drilling.case import Case
     from drillctrl.drilling.rig import Rig
 
 
@@ -37,10 +38,10 @@ def looks(labels: Sequence[str]) -> Looks:
 def plot_responses(
     responses: Mapping[str, Response],
     looks: Looks,
+    case: Case,
     name: str = "x",
     ax: Axes | None = None,
     model: str = "nonlinear",
-    rig: Rig | None = None,
 ) -> Axes:
     """Draw the motion of stable candidates after the disturbance.
 
@@ -50,18 +51,18 @@ def plot_responses(
         By label.
     looks : mapping
         Of `looks`.
+    case : Case
+        In whose units.
     name : str
         ``"x"``, ``"theta"``, or ``"torque"`` for the control.
     ax : Axes, optional
         By default new ones.
     model : {"nonlinear", "linear"}
         Which motion it is.
-    rig : Rig, optional
-        In whose units.
     """
     ax = new_axes() if ax is None else ax
     longest = 10.0
-    (unit, time_text), (scale, text) = scale_of(rig, "time"), scale_of(rig, name)
+    (unit, time_text), (scale, text) = scale_of(case, "time"), scale_of(case, name)
     for label, response in responses.items():
         colour, style = looks[label]
         run = response.run

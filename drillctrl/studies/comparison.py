@@ -190,7 +190,7 @@ class Comparison:
         pushed = ", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items())
         head = f"At {self._point_text()}; disturbance {pushed}; by {self.sort}"
         rows = [row.to_dict() for row in self.rows]
-        return comparison_text(head, rows, self._gain_texts(), self.case.rig)
+        return comparison_text(head, rows, self._gain_texts(), self.case)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -229,8 +229,8 @@ class Comparison:
             point=self._point_text(),
             sort=self.sort,
             disturbance=", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items()),
-            headings=headings(self.case.rig),
-            rows=[(row["label"], row["stable"], cells(row, self.case.rig)) for row in rows],
+            headings=headings(self.case),
+            rows=[(row["label"], row["stable"], cells(row, self.case)) for row in rows],
             legend=LEGEND,
             sentences=sentences(rows),
             gains=[
@@ -252,7 +252,7 @@ class Comparison:
         """Say where the candidates were compared."""
         point = self._operating_point()
         groups = f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
-        return groups if self.case.rig is None else f"{self.case.place} ({groups})"
+        return groups if self.case.told_rig is None else f"{self.case.place} ({groups})"
 
     def _gain_texts(self) -> dict[str, dict[str, str]]:
         """Return K1 and K2 by label, in a rig's units where there is one."""
@@ -263,7 +263,9 @@ class Comparison:
                 texts[row.label] = {
                     name: ", ".join(
                         text
-                        for line in gain_texts(found.structure, gains, case.plant, case.rig)
+                        for line in gain_texts(
+                            found.structure, gains, case.plant, case.told_rig, case.language
+                        )
                         for text in line
                     )
                     for name, gains in (("K1", found.K1), ("K2", found.K2))
@@ -274,7 +276,7 @@ class Comparison:
         """Draw charts, motions, Nyquist curves and roots; return each with its title."""
         from drillctrl.studies import compare_figure as figure
 
-        rig = self.case.rig
+        rig = self.case.told_rig
         fed = [row for row in self.rows if row.result.structure is not None]
         looks = figure.looks([row.label for row in fed])
         shown = [row for row in self.rows if row.label in looks]
@@ -293,10 +295,10 @@ class Comparison:
             *drawn,
             (
                 "Linear axial motion",
-                figure.plot_responses(linear, looks, "x", model="linear", rig=rig),
+                figure.plot_responses(linear, looks, self.case, "x", model="linear"),
             ),
-            ("Axial motion", figure.plot_responses(bent, looks, "x", rig=rig)),
-            ("Control", figure.plot_responses(bent, looks, "torque", rig=rig)),
+            ("Axial motion", figure.plot_responses(bent, looks, self.case, "x")),
+            ("Control", figure.plot_responses(bent, looks, self.case, "torque")),
             ("Nyquist curves", figure.plot_nyquist(loops, looks)),
             ("Dominant roots", figure.plot_dominant_roots(roots, looks, rig=rig)),
         ]

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drillctrl.base.text import WIDTH, wrapped
-from drillctrl.drilling.quantities import field_scale, root_scales
-from drillctrl.drilling.rig import Rig
+from drillctrl.drilling.case import Case
+from drillctrl.drilling.quantities import root_scales, told_scale
 
 # Of a row; see `Row.to_dict`.
 Fields = dict[str, Any]
@@ -52,29 +52,33 @@ LEGEND = (
 )
 
 
-def _scale(name: str, rig: Rig | None) -> tuple[float, str]:
+def _scale(name: str, case: Case) -> tuple[float, str]:
     """Return factor and unit of a column."""
     if name == "spectral_abscissa":
-        factor, _, unit = root_scales(rig)[0]
+        factor, _, unit = root_scales(case.told_rig)[0]
         return factor, unit
-    return field_scale(_QUANTITIES[name], rig) if name in _QUANTITIES else (1.0, "")
+    return (
+        told_scale(_QUANTITIES[name], case.told_rig, case.language)
+        if name in _QUANTITIES
+        else (1.0, "")
+    )
 
 
-def headings(rig: Rig | None) -> list[str]:
+def headings(case: Case) -> list[str]:
     """Return the heads of the columns, with units where there is a rig."""
-    units = [_scale(name, rig)[1] for _, name, _ in COLUMNS]
+    units = [_scale(name, case)[1] for _, name, _ in COLUMNS]
     return [
         f"{heading}, {unit}" if unit else heading
         for (heading, _, _), unit in zip(COLUMNS, units, strict=True)
     ]
 
 
-def cells(fields: Fields, rig: Rig | None = None) -> list[str]:
+def cells(fields: Fields, case: Case) -> list[str]:
     """Return the entries of a row as text, those with a unit in the rig's."""
     found = []
     for _, name, form in COLUMNS:
         value = fields[name]
-        factor = _scale(name, rig)[0]
+        factor = _scale(name, case)[0]
         if name == "nonlinear_settling_time" and value is None and fields["period"] is not None:
             found.append(f"T {factor * fields['period']:.4g}")
         elif value is None:
@@ -93,7 +97,7 @@ def comparison_text(
     head: str,
     rows: Sequence[Fields],
     gains: Mapping[str, Mapping[str, str]],
-    rig: Rig | None = None,
+    case: Case,
 ) -> str:
     """Return an aligned table, gains, a legend and what better costs.
 
@@ -105,11 +109,11 @@ def comparison_text(
         Of `Row.to_dict`, best first.
     gains : mapping
         Texts of K1 and K2 by label.
-    rig : Rig, optional
+    case : Case
         In whose units.
     """
-    table = [["", *headings(rig)]]
-    table += [[row["label"], *cells(row, rig)] for row in rows]
+    table = [["", *headings(case)]]
+    table += [[row["label"], *cells(row, case)] for row in rows]
     lines = [wrapped(head), "", *_blocks(table)]
     for one in rows:
         if one["structure"] is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.base.language import DIMENSIONLESS, Language, language_named
+from drillctrl.base.language import DIMENSIONLESS
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.report import Report, report
@@ -80,13 +80,6 @@ def check_report_path(path: str | Path) -> None:
         raise InputError("path", str(path), "a name that ends in .html")
 
 
-def _language(units: str) -> Language:
-    """Return the language of a report, which has units."""
-    if units == DIMENSIONLESS.name:
-        raise InputError("units", units, "si or field: a report is for people on a rig")
-    return language_named(units, with_rig=True)
-
-
 @checks_kinds
 def rig_report(
     where: RigPoint,
@@ -95,7 +88,6 @@ def rig_report(
     name: str = "rig",
     date: str = "",
     mapped: bool = True,
-    units: str = "si",
     executor: Executor | None = None,
     progress: Progress | None = None,
     stage: Callable[[str], None] | None = None,
@@ -105,7 +97,7 @@ def rig_report(
     Parameters
     ----------
     where : RigPoint
-        The rig, and where it drills.
+        The rig, and where it drills; the report is in its units.
     structure : str, optional
         Of a rig with a top drive a law of it, as of `drive_control`, soft torque without it;
         of others what torque at the bit follows, as of `design`, ``"pd"`` without it.
@@ -115,8 +107,6 @@ def rig_report(
         Of the report; the same input with the same date makes the same page.
     mapped : bool
         Whether a vibration map around the point is made, where one takes less than a minute.
-    units : {"si", "field"}
-        In which it is told.
     executor : concurrent.futures.Executor, optional
         Works on runs side by side.
     progress, stage : callable, optional
@@ -137,7 +127,8 @@ def rig_report(
     rig = where.rig
     driven = isinstance(rig, StringRig) and rig.drive is not None
     _check_structure(structure, driven)
-    language = _language(units)
+    if where.language is DIMENSIONLESS:
+        raise InputError("units", where.units, "si or field: a report is for people on a rig")
 
     def at(what: str) -> None:
         if stage is not None:
@@ -169,7 +160,7 @@ def rig_report(
         control = result.controller() if result.recommended else None
         if mapped:
             at("map")
-            found = _map(simple, control, language, executor, progress)
+            found = _map(simple, control, executor, progress)
         case = as_case(where)
         tasks = [_Task(0, case, None, "without control", seconds)]
         if control is not None:
@@ -188,7 +179,6 @@ def rig_report(
         drives,
         tuple(course for _, course in courses),
         found,
-        language,
         isinstance(rig, StringRig) and not driven,
         time.perf_counter() - began,
     )
@@ -252,13 +242,13 @@ def _course(task: _Task) -> tuple[int, Course]:
 def _map(
     where: RigPoint,
     control: Controller | None,
-    language: Language,
     executor: Executor | None,
     progress: Progress | None,
 ) -> VibrationMap:
     """Map what becomes of the bit around a point after a kick."""
-    speed = 30.0 / np.pi * where.rotary_speed
-    rate = max(3600.0 * where.penetration_rate, 1.0)
+    told = where.language
+    speed = told.number("angular_rate", where.rotary_speed)
+    rate = max(told.number("axial_rate", where.penetration_rate), 1.0)
     return vibration_map(
         where,
         ("speed", *(float(f"{speed * share:.2g}") for share in _ACROSS)),

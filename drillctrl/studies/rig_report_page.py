@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 from drillctrl.base.figure import embedded, restyled
 from drillctrl.base.templates import filled
+from drillctrl.strings.drives_words import drive_settings
 from drillctrl.strings.figure import plot_lumped, plot_rig
 from drillctrl.strings.rig import StringRig
 from drillctrl.studies.rig_report_figure import Line, plot_courses, plot_thresholds
@@ -13,7 +14,6 @@ from drillctrl.studies.rig_report_values import ReportValues
 from drillctrl.studies.rig_report_words import (
     Rows,
     checked,
-    drive_settings,
     gain_settings,
     mode_rows,
     place_text,
@@ -97,7 +97,7 @@ def _settings(found: ReportValues) -> Rows:
         return []
     if found.drives is not None:
         law = found.drives.drives[-1]
-        return drive_settings(law, found.language)
+        return drive_settings(law.control, found.language)
     assert found.design is not None
     return gain_settings(found.design, found.language)
 

@@ -67,8 +67,6 @@ class ReportValues:
         Runs without control and with it.
     map : VibrationMap or None
         Around the point.
-    language : Language
-        In whose units it is told.
     is_lumped : bool
         Whether gains and map are of the string lumped to one mass each way.
     elapsed_seconds : float
@@ -85,9 +83,13 @@ class ReportValues:
     drives: DriveComparison | None
     courses: tuple[Course, ...]
     map: VibrationMap | None
-    language: Language
     is_lumped: bool
     elapsed_seconds: float
+
+    @property
+    def language(self) -> Language:
+        """In whose units it is told."""
+        return self.point.language
 
     @property
     def design(self) -> Design | None:

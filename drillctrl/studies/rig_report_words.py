@@ -10,9 +10,8 @@ from drillctrl.designs.result import Design
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.simulation.status import Outcome
 from drillctrl.strings.check import Mode
-from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
-from drillctrl.strings.drives_words import law_text
+from drillctrl.strings.drives_words import setting_sentence
 from drillctrl.strings.rig import StringRig
 from drillctrl.studies.rig_report_values import Course, ReportValues
 
@@ -75,10 +74,7 @@ def _of_drive(found: ReportValues) -> list[str]:
         ]
     if not found.recommended:
         return [f"Do not use {law.control.name} here: in the run the bit did worse with it."]
-    settings = ", ".join(
-        f"{name} to {value}" for name, value in drive_settings(law, found.language)
-    )
-    told = [f"Set {settings} ({law.control.name}) of the drive."]
+    told = [setting_sentence(law.control, found.language)]
     if law is not stiff:
         first = law.modes[0]
         hertz = found.language.text("frequency", first.slope.mode_frequency, 3)
@@ -96,10 +92,6 @@ def _of_drive(found: ReportValues) -> list[str]:
             " turns faster (a guess: measure it)."
         )
     return told
-
-
-def _settings_text(law: DriveMeasures, language: Language) -> str:
-    return ", ".join(" ".join(row) for row in drive_settings(law, language))
 
 
 def threshold_speed(drive: DriveMeasures) -> float:
@@ -131,9 +123,9 @@ def _at_bit(found: ReportValues) -> list[str]:
             speed = found.language.text("angular_rate", change.value * found.point.rotary_speed)
             told.append(f"At {speed} and the same {rate} the bit keeps turning from every start.")
     if found.recommended:
-        told.append(
-            "Or control the torque at the bit with the settings below: " + _good(design) + "."
-        )
+        rows = gain_settings(design, found.language)
+        settings = ", ".join(f"{name.partition(',')[0]} {value}" for name, value in rows)
+        told.append(f"Or control the torque at the bit, {settings}: {_good(design)}.")
     else:
         told.append("No control is offered: " + _why_not(found, design) + ".")
     return told
@@ -147,22 +139,6 @@ def _why_not(found: ReportValues, design: Design) -> str:
     if design.recommended is True:
         return "on the string itself the bit did worse with it"
     return design.reason.rstrip(".")
-
-
-def drive_settings(drive: DriveMeasures, language: Language) -> Rows:
-    """Return the parameters of a law of a drive, in its own words."""
-    control = drive.control
-    integral, rest = without_integral(control.speed)
-    if control.torque or len(rest.denominator) > 1 or len(rest.numerator) > 2:
-        return [("law", law_text(control))]
-    gains = [part / rest.denominator[0] for part in rest.numerator]
-    rows = [
-        ("P", language.text("drive_impedance", gains[-1], 3)),
-        ("I", language.text("drive_stiffness", integral, 3)),
-    ]
-    if len(gains) == 2 and gains[0]:
-        rows.append(("compensated inertia", language.text("inertia", -gains[0], 3)))
-    return rows
 
 
 def gain_settings(design: Design, language: Language) -> Rows:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -15,9 +14,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress
 from drillctrl.charts.chart import chart
 from drillctrl.charts.plane import AxisLike, Plane, make_plane
@@ -28,6 +25,7 @@ from drillctrl.simulation.starts import possible_starts, start_named
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
 from drillctrl.studies.lattice import Node, explore, fine_shape
 from drillctrl.studies.tasks import controller_at, run_tasks
+from drillctrl.studies.vibration_files import save_map
 from drillctrl.studies.vibration_point import (
     QUANTITIES,
     VibrationTask,
@@ -56,7 +54,10 @@ class VibrationMap(MapValues):
         return map_summary(self)
 
     def plot(
-        self, quantities: Sequence[str] = ("outcome", "swing"), name: str | None = None
+        self,
+        quantities: Sequence[str] = ("outcome", "swing"),
+        name: str | None = None,
+        difference: bool = False,
     ) -> Figure:
         """Draw quantities over the two axes, without and with control side by side.
 
@@ -67,7 +68,16 @@ class VibrationMap(MapValues):
             ``"feed"``, ``"weight_ratio"``: a row of pictures each.
         name : str, optional
             Of the rig, for the title.
+        difference : bool
+            Whether a third column says what control changes.
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity, or no control to make a difference.
         """
+        if difference and self.controlled is None:
+            raise InputError("difference", "asked for", "left out where there is no control")
         from drillctrl.studies.vibration_figure import Drawn, plot_map
 
         columns = {"without control": self.uncontrolled}
@@ -84,39 +94,25 @@ class VibrationMap(MapValues):
             self.cells,
             drawn,
             tuple(quantities),
+            difference=difference,
             marked=self.marked,
             title=place_text(self, name),
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the rows as CSV or all of it as JSON, whole or not at all.
+        """Write rows as CSV, all as JSON, or the lattice as NetCDF, whole or not at all.
 
         Raises
         ------
         InputError
-            If the name does not end in .csv or .json.
+            If the name does not end in .csv, .json or .nc.
         """
-        check_map_path(path)
-        if Path(path).suffix.lower() == ".json":
-            text = json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
-        else:
-            axes = (self.plane.x, self.plane.y)
-            told = ", ".join(f"{axis.name} in {axis.unit or '1'}" for axis in axes)
-            starts = ", ".join(self.starts)
-            note = f"drillctrl map: {told}; the worst of the starts {starts}"
-            text = csv_text(self.columns(), self.rows(), [note])
-        write_text(path, text)
+        save_map(self, path)
 
     def __repr__(self) -> str:
         x, y = self.plane.x.name, self.plane.y.name
         control = "no control" if self.structure is None else self.structure.name
         return f"<VibrationMap: {len(self.nodes)} points over {x} × {y}, {control}>"
-
-
-def check_map_path(path: str | Path) -> None:
-    """Raise `InputError` if a map cannot be written under this name."""
-    if Path(path).suffix.lower() not in (".csv", ".json"):
-        raise InputError("path", str(path), "a name that ends in .csv or .json")
 
 
 @checks_kinds

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import axis_name, headline, new_figure
+from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, headline, new_figure
 from drillctrl.charts.figure import axis_text
 from drillctrl.charts.plane import Plane
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
@@ -78,6 +78,7 @@ def plot_map(
     drawn: Sequence[Drawn],
     quantities: Sequence[str],
     *,
+    difference: bool = False,
     marked: tuple[float, float] | None,
     title: str,
 ) -> Figure:
@@ -93,6 +94,8 @@ def plot_map(
         Columns.
     quantities : sequence of str
         Some of `SHOWN`.
+    difference : bool
+        Whether a further column says what the last controller changes against the first.
     marked : (float, float) or None
         The operating point.
     title : str
@@ -104,32 +107,39 @@ def plot_map(
         If there is no such quantity.
     """
     check_shown(quantities)
-    figure = new_figure(1.6 + 4.2 * len(drawn) + 1.2, 3.6 * len(quantities) + 0.8)
-    grid = figure.subplots(len(quantities), len(drawn), squeeze=False, sharex=True, sharey=True)
+    columns = len(drawn) + int(difference)
+    figure = new_figure(1.6 + 4.2 * columns + 1.2, 3.6 * len(quantities) + 0.8)
+    grid = figure.subplots(len(quantities), columns, squeeze=False, sharex=True, sharey=True)
+    beside, grid = grid[:, len(drawn) :], grid[:, : len(drawn)]
     x = np.linspace(plane.x.low, plane.x.high, shape[0])
     y = np.linspace(plane.y.low, plane.y.high, shape[1])
 
     def whole(values: Any) -> FloatArray:
         return fill(shape, cells, nodes, np.array(values, dtype=float))
 
-    for row, name in zip(grid, quantities, strict=True):
+    for row, name, changed in zip(grid, quantities, beside, strict=True):
         if name == "outcome":
-            _outcomes(row, x, y, [whole(_ranks(each)) for each in drawn])
+            fields = [whole(_ranks(each)) for each in drawn]
+            _outcomes(row, x, y, fields)
         else:
             factor = 100.0 if name in _PERCENT else 1.0
             fields = [factor * whole(each.columns[name]) for each in drawn]
             _coloured(row, x, y, fields, *_COLOURED[name])
+        for ax in changed:
+            _change(ax, x, y, fields[-1] - fields[0], name)
     for row in grid:
         for ax, each in zip(row, drawn, strict=True):
             _overlay(ax, x, y, whole(each.columns["spectral_abscissa"]), each, marked)
             ax.set_xlim(plane.x.low, plane.x.high)
             ax.set_ylim(plane.y.low, plane.y.high)
-    for ax in grid[-1]:
+    for ax in (*grid[-1], *beside[-1]):
         ax.set_xlabel(axis_text(plane.x))
     for ax in grid[:, 0]:
         ax.set_ylabel(axis_text(plane.y))
     for ax, each in zip(grid[0], drawn, strict=True):
         ax.set_title(headline(each.title, 48), fontsize="medium")
+    for ax in beside[0] if difference else ():
+        ax.set_title("change by control", fontsize="medium")
     _legend(figure, grid, "outcome" in quantities, marked is not None)
     figure.suptitle(title, fontsize="medium")
     return figure
@@ -172,9 +182,43 @@ def _coloured(
         picture = ax.pcolormesh(
             x, y, np.ma.masked_invalid(field.T), shading="nearest", cmap=colours, vmin=low, vmax=top
         )
+        if low == 0.0:
+            _contours(ax, x, y, field, top)
     row[0].figure.colorbar(
         picture, ax=list(row), label=label, extend="max" if largest > top else "neither"
     )
+
+
+def _change(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, name: str) -> None:
+    """Draw what control changes: blue is better, orange worse, white alike."""
+    from matplotlib.colors import ListedColormap
+
+    if name == "outcome":
+        colours = ListedColormap([BLUE, "white", ORANGE])
+        picture = ax.pcolormesh(
+            x, y, np.sign(field).T, shading="nearest", cmap=colours, vmin=-1.5, vmax=1.5
+        )
+        bar = ax.figure.colorbar(picture, ax=ax, ticks=[-1, 0, 1])
+        bar.ax.set_yticklabels(["better", "alike", "worse"])
+        bar.set_label(axis_name("change of outcome"))
+        return
+    _, colours_of, _, _ = _COLOURED[name]
+    label = axis_name(f"change of {name.replace('_', ' ')}", "%" if name in _PERCENT else "")
+    reach = max(float(np.abs(field[np.isfinite(field)]).max(initial=0.0)), 1e-3)
+    ax.set_facecolor(_BROKEN)
+    picture = ax.pcolormesh(
+        x, y, np.ma.masked_invalid(field.T), shading="nearest", vmin=-reach, vmax=reach,
+        cmap="RdBu" if colours_of.endswith("_r") else "RdBu_r",
+    )  # fmt: skip
+    ax.figure.colorbar(picture, ax=ax, label=label)
+
+
+def _contours(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, top: float) -> None:
+    """Draw thin lines of equal value, a quarter of the scale apart."""
+    levels = [share * top for share in (0.25, 0.5, 0.75)]
+    known = field[np.isfinite(field)]
+    if known.size and known.min() < levels[-1] and known.max() > levels[0]:
+        ax.contour(x, y, np.ma.masked_invalid(field.T), levels=levels, colors=GREY, linewidths=0.5)
 
 
 def _overlay(

@@ -33,8 +33,9 @@ def controller_text(found: MapValues) -> str:
     if not isinstance(controller, Controller):
         return f"{structure.name}, gains of a table"
     _, K1, K2 = controller.gain_sets()
-    plant, _ = found.plane.case.physics("a map")
-    return control_text(structure, K1[0], K2[0], plant, found.plane.case.rig)
+    case = found.plane.case
+    plant, _ = case.physics("a map")
+    return control_text(structure, K1[0], K2[0], plant, case.told_rig, case.language)
 
 
 def map_summary(found: MapValues) -> str:

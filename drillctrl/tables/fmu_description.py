@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from drillctrl.drilling.quantities import FIELD_UNITS, SI_UNITS
+from drillctrl.base.language import SI
+from drillctrl.drilling.quantities import SI_UNITS
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.interpolation import UNSAFE
 from drillctrl.tables.sampled import SampledController
@@ -15,11 +16,11 @@ from drillctrl.tables.settings import STATUS_BITS
 VERSIONS = ("3.0", "2.0")
 # SI unit → powers of base units, and what people on rigs read with how many are one of it.
 _UNITS: dict[str, tuple[dict[str, int], tuple[str, float] | None]] = {
-    "m": ({"m": 1}, FIELD_UNITS["length"]),
-    "m/s": ({"m": 1, "s": -1}, FIELD_UNITS["axial_rate"]),
+    "m": ({"m": 1}, SI.units["length"]),
+    "m/s": ({"m": 1, "s": -1}, SI.units["axial_rate"]),
     "rad": ({"rad": 1}, None),
-    "rad/s": ({"rad": 1, "s": -1}, FIELD_UNITS["angular_rate"]),
-    "N": ({"kg": 1, "m": 1, "s": -2}, FIELD_UNITS["force"]),
+    "rad/s": ({"rad": 1, "s": -1}, SI.units["angular_rate"]),
+    "N": ({"kg": 1, "m": 1, "s": -2}, SI.units["force"]),
     "N.m": ({"kg": 1, "m": 2, "s": -2}, ("kN.m", 1e-3)),
     "Pa": ({"kg": 1, "m": -1, "s": -2}, ("MPa", 1e-6)),
     "s": ({"s": 1}, None),

@@ -57,6 +57,7 @@ VERBS = {
     "table": ("--omega0", "8:9:2", "--delta0", "1:2:2", "--structure", "p", "--trials", "none",
               "--out", "gains.csv"),
     "reproduce": ("equations",),
+    "report": (*RIG, "--structure", "p", "--no-map", "--workers", "1", "--out", "report.html"),
     "rig": ("check", "table1"),
 }  # fmt: skip
 

@@ -191,3 +191,33 @@ def test_bad_input_is_refused(capsys, arguments, named):
     assert stop.value.code == 2
     assert named in error
     assert error.count("\n") == 1
+
+
+def test_a_grid_for_other_programs_holds_the_points(found, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    found.save(tmp_path / "map.nc")
+    with xarray.open_dataset(tmp_path / "map.nc", engine="scipy", mask_and_scale=False) as data:
+        columns, words = found.columns(), data["outcome"].attrs["flag_meanings"].split()
+        for i, (x, y) in enumerate(zip(columns["speed"], columns["rop"], strict=True)):
+            here = data.sel(speed=x, rop=y, method="nearest")
+            assert words[int(here["outcome"])] == columns["outcome"][i]
+            swing = columns["uncontrolled_swing"][i]
+            assert float(here["uncontrolled_swing"]) == pytest.approx(
+                np.nan if swing is None else swing, nan_ok=True
+            )
+        assert data["rop"].attrs["units"] == "m/h"
+
+
+def test_what_control_changes_is_drawn_beside(found):
+    figure = found.plot(("outcome", "swing"), difference=True)
+    panels = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+    changed = [ax for ax in panels if ax.get_subplotspec().colspan.start == 2]
+    assert changed[0].get_title() == "change by control"
+    swing = changed[1].collections[0].get_array().filled(np.nan).T.ravel()
+    columns = found.columns()
+    order = np.lexsort((columns["rop"], columns["speed"]))
+    known = [np.array(columns[n], dtype=float)[order] for n in ("swing", "uncontrolled_swing")]
+    np.testing.assert_allclose(swing, known[0] - known[1])
+    alone = vibration_map(POINT, X, Y, **{**QUICK, "counts": (2, 2), "starts": ("small",)})
+    with pytest.raises(InputError, match="difference"):
+        alone.plot(difference=True)
