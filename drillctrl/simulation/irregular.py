@@ -8,7 +8,7 @@ import weakref
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.drilling.motion import BIT_STATES
+from drillctrl.drilling.linear import BIT_STATES
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
