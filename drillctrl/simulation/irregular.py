@@ -62,6 +62,12 @@ def _comes_apart(run: Simulation) -> bool:
         controller = dataclasses.replace(controller, activation=0.0)
     begin = _turning(run, since, end)
     past, size = run.past(begin), _sizes(run, since, end)
+    instants = np.linspace(0.0, end - begin, _SAMPLES)
+
+    def scaled(path: Simulation, times: FloatArray) -> FloatArray:
+        names = run.state_names[:BIT_STATES]
+        motion = path.at(np.minimum(times, path.times[-1]), names)
+        return np.stack([getattr(motion, name) for name in names]) / size[:, None]
 
     def go_on(kick: dict[str, float]) -> FloatArray | None:
         after = simulate(
@@ -76,17 +82,17 @@ def _comes_apart(run: Simulation) -> bool:
         )
         if after.status != Status.DONE:
             return None
-        at = after.at(np.linspace(0.0, end - begin, _SAMPLES), run.state_names[:BIT_STATES])
-        return np.stack([getattr(at, n) for n in run.state_names[:BIT_STATES]]) / size[:, None]
+        return scaled(after, instants)
 
-    beside = go_on({})
-    if beside is None:
+    def apart(one: FloatArray | None, other: FloatArray | None) -> bool:
+        return one is not None and other is not None and float(abs(one - other).max()) >= _APART
+
+    # What the tolerance of the run adds can but drive its neighbour further away.
+    turned = go_on({"dtheta": _KICK * float(size[3])})
+    if not apart(turned, scaled(run, begin + instants)):
         return False
-    for place, name in ((3, "dtheta"), (1, "dx")):
-        after = go_on({name: _KICK * float(size[place])})
-        if after is None or float(abs(after - beside).max()) < _APART:
-            return False
-    return True
+    beside = go_on({})
+    return apart(turned, beside) and apart(go_on({"dx": _KICK * float(size[1])}), beside)
 
 
 def _sizes(run: Simulation, since: float, until: float) -> FloatArray:
