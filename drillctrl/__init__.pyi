@@ -136,6 +136,7 @@ from .simulation.drive_control import drive_controller as drive_controller
 from .simulation.drive_control import law_controller as law_controller
 from .simulation.energy import band_energy as band_energy
 from .simulation.floquet import floquet as floquet
+from .simulation.irregular import irregular as irregular
 from .simulation.orbits import limit_cycle as limit_cycle
 from .simulation.orbits import separation as separation
 from .simulation.past import Past as Past

@@ -27,7 +27,7 @@ _APART, _RATE = 0.1, 0.01
 _HALF = 0.5
 # A bit that falls behind bounces ever harder; one that stands still does not.
 FAILURES = {Outcome.STALLS: 1, Outcome.LATE: 2, Outcome.TURNS_BACK: 3, Outcome.DIVERGES: 4}
-_QUIET = (Outcome.SETTLES, Outcome.ORBIT, Outcome.BOUNCES)
+_QUIET = (Outcome.SETTLES, Outcome.ORBIT, Outcome.CHAOTIC, Outcome.BOUNCES)
 NO_GAINS = "there is no feedback to try"
 LEFT_OUT = "the gains have not been tried on the nonlinear motion"
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.drilling.hoist import HOOK
 from drillctrl.simulation.bounds import BEYOND, rate_scales
+from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
 
@@ -34,7 +35,8 @@ class Figures:
     ----------
     outcome : Outcome
         ``"settles"``: steady drilling, reached or nearly so and still nearing;
-        ``"orbit"``: a bounded motion, periodic or not, without stick and on the rock;
+        ``"orbit"``: a bounded motion without stick and on the rock, of which nothing says that
+        it is ``"chaotic"``: one that does not repeat and whose neighbours come apart;
         ``"bounces"``: the bit leaves the rock; ``"stick-slip"``: it stands still at times;
         ``"does-not-keep-up"``: it falls behind the feed of the top end, or has, so that the
         string presses on it with more than twice the steady weight; ``"stalls"``: it
@@ -73,8 +75,8 @@ def figures(run: Simulation) -> Figures:
 
     Notes
     -----
-    Whether an orbit is periodic or irregular takes more than one run to tell; see
-    `simulation.orbits`.
+    Whether an orbit is chaotic takes two short runs beside it; see `irregular`, which also
+    tells it of motions that bounce or stick and slip, and are named so.
     """
     whole = run.motion
     largest = float(max(np.abs(whole.axial).max(), np.abs(whole.torque).max()))
@@ -138,7 +140,9 @@ def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> 
         return Outcome.STICK_SLIP
     if _settles(run, tail):
         return Outcome.SETTLES
-    return Outcome.ORBIT if bool(tail.contact.all()) else Outcome.BOUNCES
+    if not bool(tail.contact.all()):
+        return Outcome.BOUNCES
+    return Outcome.CHAOTIC if irregular(run) else Outcome.ORBIT
 
 
 def _fed_by_weight(run: Simulation) -> bool:

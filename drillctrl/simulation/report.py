@@ -11,6 +11,7 @@ import numpy as np
 from drillctrl.base import units
 from drillctrl.base.text import set_out, wrapped
 from drillctrl.drilling.quantities import told_scale
+from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from drillctrl.simulation.starts import StartSet
 
 
+# Motions that go on and may or may not repeat.
+_LASTING = (Outcome.ORBIT, Outcome.CHAOTIC, Outcome.BOUNCES, Outcome.STICK_SLIP)
 # Steps by which chattering is told, and how short they are then on the mean.
 _LAST_STEPS, _CHATTER = 10_000, 1e-3
 
@@ -61,13 +64,21 @@ def _judged(run: Simulation) -> dict[str, Any]:
         name: value if value is None or math.isfinite(value) else None
         for name, value in loads(run).to_dict().items()
     }
-    return {"outcome": found.outcome, "swing": found.swing, "feed": found.feed, **known}
+    told = {"outcome": found.outcome, "irregular": _irregular(run, found.outcome)}
+    return {**told, "swing": found.swing, "feed": found.feed, **known}
+
+
+def _irregular(run: Simulation, outcome: Outcome) -> bool | None:
+    """Return whether a motion is chaotic; None where its name leaves no such question."""
+    return irregular(run) if outcome in _LASTING else None
 
 
 def _outcome_text(run: Simulation) -> str:
     """Return what became of the motion in one line."""
     found = figures(run)
     parts = [found.outcome.sentence]
+    if found.outcome is not Outcome.CHAOTIC and _irregular(run, found.outcome):
+        parts.append("irregularly")
     if found.swing is not None and found.outcome is not Outcome.SETTLES:
         parts.append(f"swing {found.swing:.3g}")
     if found.feed is not None and found.outcome is not Outcome.SETTLES:

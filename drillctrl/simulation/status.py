@@ -36,6 +36,7 @@ class Outcome(_Told):
 
     SETTLES = "settles", "the motion settles"
     ORBIT = "orbit", "the bit goes on swinging"
+    CHAOTIC = "chaotic", "the bit goes on swinging and never repeats itself"
     BOUNCES = "bounces", "the bit bounces"
     STICK_SLIP = "stick-slip", "the bit sticks and slips"
     LATE = "does-not-keep-up", "the bit falls behind the feed"
@@ -55,12 +56,13 @@ class Outcome(_Told):
     @property
     def calm(self) -> bool:
         """Whether the bit stays in the rock, turning, and keeps up with its feed."""
-        return self in (Outcome.SETTLES, Outcome.ORBIT)
+        return self in (Outcome.SETTLES, Outcome.ORBIT, Outcome.CHAOTIC)
 
 
 _BY_SEVERITY = (
     Outcome.SETTLES,
     Outcome.ORBIT,
+    Outcome.CHAOTIC,
     Outcome.BOUNCES,
     Outcome.STICK_SLIP,
     Outcome.LATE,

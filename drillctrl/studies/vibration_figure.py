@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 OUTCOMES = {
     Outcome.SETTLES: ("smooth drilling", "#E8F1F8"),
     Outcome.ORBIT: ("swings without stick", "#9CCBEA"),
+    Outcome.CHAOTIC: ("swings, never repeating", "#56A0D3"),
     Outcome.BOUNCES: ("bit bounces", "#F0E442"),
     Outcome.STICK_SLIP: ("stick-slip", "#E69F00"),
     Outcome.LATE: ("falls behind the feed", "#D55E00"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .data import (
     ACTUATOR,
     BY_TORQUE,
@@ -89,8 +91,9 @@ def piece_at(times, t):
 def row_of(whole, value, i, y):
     """Row i of the matrix of `Settings` times y."""
     total = 0.0
-    for e in range(whole[ROWS + i], whole[ROWS + i + 1]):
-        total += value[e] * y[whole[e]]
+    # Places without a sign are not looked at for being negative.
+    for e in range(np.uint64(whole[ROWS + i]), np.uint64(whole[ROWS + i + 1])):
+        total += value[e] * y[np.uint64(whole[e])]
     return total
 
 
