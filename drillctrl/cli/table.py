@@ -104,6 +104,8 @@ def table_command(
       drillctrl table --rig table1 --speed "110:120:2 rpm" --rop "50 m/h" --structure pd \\
           --objective drilling --kick 0.1 --limit "0.9 kN*m"
       drillctrl table --rig vertical-3000 --structure soft-torque --depth "2000:3000:3 m"
+      drillctrl table --rig vertical-3000 --structure soft-torque --out drive.c \\
+          --period "10 ms" --limit "40 kN*m"
 
     With --out a run that was killed goes on where it was when it is started again.
     """

@@ -34,7 +34,7 @@ _VARIABLES = """
     CellKinds
 """
 VARIABLES = frozenset(_VARIABLES.split())
-_DIALECTS = (
+DIALECTS = (
     "IEC 61131-3, second edition, Structured Text without extensions of a vendor.",
     "Structured Control Language of Siemens (TIA Portal, S7-1500), as an external source.",
 )
@@ -121,7 +121,7 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
         "fading": settings.fading,
         "ends": [[_number(value) for value in pair] for pair in controller.ends()],
         "scl": scl,
-        "dialect_words": _DIALECTS[scl],
+        "dialect_words": DIALECTS[scl],
         "sizes": sizes,
         "period": _number(settings.period),
         "limit": _number(settings.limit),
@@ -141,7 +141,7 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
         else "dimensionless",
     }
     text = filled("drillctrl.tables", "controller.st.j2", **words)
-    return _with_marks(text) if scl else text
+    return with_marks(text, VARIABLES) if scl else text
 
 
 def _bench(table: GainTable, controller: SampledController, vectors: Vectors) -> str:
@@ -177,11 +177,11 @@ def _bench(table: GainTable, controller: SampledController, vectors: Vectors) ->
     )
 
 
-def _with_marks(text: str) -> str:
+def with_marks(text: str, variables: frozenset[str]) -> str:
     """Return a block with the mark # before each variable in its statements."""
     declared, body = text.split("\nBEGIN\n")
     return f"{declared}\nBEGIN\n" + re.sub(
-        rf"\b({'|'.join(sorted(VARIABLES, key=len, reverse=True))})\b", r"#\1", body
+        rf"\b({'|'.join(sorted(variables, key=len, reverse=True))})\b", r"#\1", body
     )
 
 
