@@ -28,12 +28,16 @@ _VARIABLES = """
     ReleaseSamples SampleSeen SampleGood SampleEqual SampleLate SampleLost SignalFrozen
     GainTrusted GoodSample GoodPlace GoodDelay TrustedGains PastValue LimitNow StartCommand
     WantedCommand RampShare LargestInput FadeSamples HoldSamples FrozenSamples FastestChange
-    GainValues CellShare CellLow AxisIndex EntryIndex CornerA CornerB CornerC CellKind NodeIndex
+    GainValues CellShare CellLow AxisIndex EntryIndex CellKind NodeIndex
     WholeSamples NearSample FarSample CornerWeight PartSample SamplesBack InsideTable
-    SamplePeriod CommandLimit RampSamples RingDepth TicksA TicksB TicksC NodeGains CellGains
+    SamplePeriod CommandLimit RampSamples RingDepth NodeGains CellGains
     CellKinds
 """
-VARIABLES = frozenset(_VARIABLES.split())
+# A letter an axis.
+LETTERS = "ABCDEFGH"
+VARIABLES = frozenset(_VARIABLES.split()) | {
+    f"{what}{letter}" for what in ("Corner", "Ticks") for letter in LETTERS
+}
 DIALECTS = (
     "IEC 61131-3, second edition, Structured Text without extensions of a vendor.",
     "Structured Control Language of Siemens (TIA Portal, S7-1500), as an external source.",
@@ -107,8 +111,10 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
     gain_units = rig_gain_units(structure, plant, rig)
     si = {name: SI_UNITS[plant.quantity(name)] for name in (*structure.outputs, *structure.inputs)}
     outputs = len(structure.outputs)
-    sizes = dict(zip("ABC", map(len, controller.axes), strict=True))
-    arrays = {f"Ticks{letter}": ticks for letter, ticks in zip("ABC", controller.axes, strict=True)}
+    sizes = dict(zip(LETTERS, map(len, controller.axes), strict=False))
+    arrays = {
+        f"Ticks{letter}": ticks for letter, ticks in zip(LETTERS, controller.axes, strict=False)
+    }
     arrays["NodeGains"] = controller.node_gains
     # An array of no elements is not Structured Text.
     arrays["CellGains"] = controller.cell_gains or (0.0,)

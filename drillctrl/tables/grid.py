@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +38,9 @@ FIELD_UNITS = {
     "weight_on_bit": ("kN", 1e-3),
     "rock_strength": ("MPa", 1e-6),
 }
+# Groups that further axes may go over, and how many axes there may be: a cell has 2^a corners.
+FURTHER = ("eta", "xi", "kappa", "beta")
+MOST_AXES = 8
 DIMENSIONLESS = ("omega0", "delta0", "psi")
 RATE = ("rotary_speed", "penetration_rate", "rock_strength")
 WEIGHT = ("rotary_speed", "weight_on_bit", "rock_strength")
@@ -119,7 +123,7 @@ class Grid:
         If axes and reference do not fit, or there are more than `MAX_NODES` nodes.
     """
 
-    axes: tuple[Axis, Axis, Axis]
+    axes: tuple[Axis, ...]
     reference: OperatingPoint | Rig
     plant: Plant = None  # type: ignore[assignment]
 
@@ -129,11 +133,19 @@ class Grid:
             object.__setattr__(self, "plant", paper_plant(**parts))
         names = tuple(axis.name for axis in self.axes)
         fitting: tuple[tuple[str, ...], ...] = (RATE, WEIGHT)
+        further = set(self.plant.own)
         if self.rig is None:
             fitting = tuple((*DIMENSIONLESS[:2], third) for third in ("psi", *self.plant.own))
-        if names not in fitting:
+            further |= {*FURTHER}
+        if names[:3] not in fitting:
             wanted = " or ".join(", ".join(choice) for choice in fitting)
             raise InputError("axes", ", ".join(names), wanted)
+        if len(names) > MOST_AXES:
+            raise InputError("axes", ", ".join(names), f"at most {MOST_AXES}")
+        for i, name in enumerate(names[3:], 3):
+            if name not in further or name in names[:i]:
+                known = ", ".join(sorted(further - {*names[:i]})) or "none, of this plant"
+                raise InputError("axes", name, f"each once, and of {known}")
         if math.prod(self.shape) > MAX_NODES:
             raise InputError("grid", f"{math.prod(self.shape)} nodes", f"at most {MAX_NODES} nodes")
 
@@ -143,20 +155,19 @@ class Grid:
         return self.reference if isinstance(self.reference, Rig) else None
 
     @property
-    def names(self) -> tuple[str, str, str]:
-        """Parameters of the case that the three axes stand for."""
+    def names(self) -> tuple[str, ...]:
+        """Parameters of the case that the axes stand for."""
         third = "psi" if self.rig is not None else self.axes[2].name
-        return ("omega0", "delta0", third)
+        return ("omega0", "delta0", third, *(axis.name for axis in self.axes[3:]))
 
     @property
-    def shape(self) -> tuple[int, int, int]:
+    def shape(self) -> tuple[int, ...]:
         """Number of values on each axis."""
-        a, b, c = (len(axis.values) for axis in self.axes)
-        return a, b, c
+        return tuple(len(axis.values) for axis in self.axes)
 
     @property
     def coordinates(self) -> FloatArray:
-        """Coordinates of all nodes on the axes, (q, 3)."""
+        """Coordinates of all nodes on the axes, (q, a)."""
         mesh = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
         return np.column_stack([values.ravel() for values in mesh])
 
@@ -170,19 +181,19 @@ class Grid:
         """What drills at all nodes."""
         return tuple(self.case(*row) for row in self.coordinates.tolist())
 
-    def case(self, speed: float, feed: float, rock: float) -> Case:
-        """Return what drills at coordinates on the three axes."""
-        third, plant = self.names[2], self.plant
-        if third != "psi":
-            plant = plant.with_values(**{third: rock})
-        return Case(plant, self.point(speed, feed, rock))
+    def case(self, *coordinates: float) -> Case:
+        """Return what drills at coordinates on the axes."""
+        given = dict(zip(self.names[2:], coordinates[2:], strict=True))
+        own = {name: value for name, value in given.items() if name in self.plant.own}
+        return Case(self.plant.with_values(**own), self.point(*coordinates))
 
-    def point(self, speed: float, feed: float, rock: float) -> OperatingPoint:
-        """Return the operating point at coordinates on the three axes."""
+    def point(self, *coordinates: float) -> OperatingPoint:
+        """Return the operating point at coordinates on the axes."""
         if isinstance(self.reference, OperatingPoint):
-            rocks = {"psi": rock} if self.names[2] == "psi" else {}
-            return self.reference.with_changes(omega0=speed, delta0=feed, **rocks)
-        return self._rig_point(self.reference, speed, feed, rock).operating_point()
+            given = dict(zip(self.names, coordinates, strict=True))
+            groups = {k: v for k, v in given.items() if k not in self.plant.own}
+            return self.reference.with_changes(**groups)
+        return self._rig_point(self.reference, *coordinates[:3]).operating_point()
 
     def _rig_point(self, rig: Rig, speed: float, feed: float, rock: float) -> RigPoint:
         placed = rig.with_rock_strength(rock)
@@ -191,19 +202,19 @@ class Grid:
         return RigPoint(placed, speed, feed)
 
     def groups(self, coordinates: npt.ArrayLike) -> FloatArray:
-        """Return `names` at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
+        """Return `names` at coordinates on the axes in their SI units, (q, a) → (q, a)."""
         places = np.atleast_2d(np.asarray(coordinates, dtype=float))
         if self.rig is None:
             return places
         points = [self.point(*row) for row in places.tolist()]
-        return np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+        groups = np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+        return np.column_stack([groups, places[:, 3:]])
 
-    def locate(
-        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
-    ) -> FloatArray:
-        """Return coordinates on the axes of values of `names`, (q,) each → (q, 3)."""
-        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in
-                                       (omega0, delta0, psi)))  # fmt: skip
+    def locate(self, *values: npt.ArrayLike) -> FloatArray:
+        """Return coordinates on the axes of values of `names`, (q,) each → (q, a)."""
+        if len(values) != len(self.names):
+            raise InputError("coordinates", len(values), f"those of {', '.join(self.names)}")
+        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in values))
         groups = np.column_stack([array.ravel() for array in arrays])
         rig = self.rig
         if rig is None:
@@ -216,7 +227,7 @@ class Grid:
         feed = groups[:, 1] * speed * length
         if self.axes[1].name == "weight_on_bit":
             feed = weight_on_bit(rig, speed, feed, strength)
-        return np.column_stack([speed, feed, strength])
+        return np.column_stack([speed, feed, strength, groups[:, 3:]])
 
 
 def dimensionless_grid(
@@ -226,6 +237,7 @@ def dimensionless_grid(
     reference: OperatingPoint | Case | None = None,
     *,
     parameter: Axis | None = None,
+    further: Sequence[Axis] = (),
 ) -> Grid:
     """Return a grid over dimensionless groups.
 
@@ -238,6 +250,8 @@ def dimensionless_grid(
         paper's.
     parameter : Axis, optional
         Over a parameter of the plant's parts; ψ is then a number.
+    further : sequence of Axis
+        Over further parameters of the plant's parts, or of eta, xi, kappa and beta.
 
     Raises
     ------
@@ -260,7 +274,7 @@ def dimensionless_grid(
         if len(third.values) > 1:
             raise InputError("psi", list(third.values)[:4], f"a number beside {parameter.name}")
         third = parameter
-    return Grid((axes[0], axes[1], third), here, plant or paper_plant())
+    return Grid((axes[0], axes[1], third, *further), here, plant or paper_plant())
 
 
 def rig_grid(
@@ -270,6 +284,7 @@ def rig_grid(
     penetration_rate: Axis | float | None = None,
     weight_on_bit: Axis | float | None = None,
     rock_strength: Axis | float | None = None,
+    further: Sequence[Axis] = (),
 ) -> Grid:
     """Return a grid in rig units, all SI.
 
@@ -283,6 +298,8 @@ def rig_grid(
         m/s, or N; one of the two.
     rock_strength : Axis or float, optional
         Pa; by default that of the rig.
+    further : sequence of Axis
+        Over parameters of the plant's parts.
 
     Raises
     ------
@@ -304,7 +321,7 @@ def rig_grid(
     rock = rig.rock_strength if rock_strength is None else rock_strength
     axes = [_as_axis(*pair) for pair in zip(names, (rotary_speed, feed, rock), strict=True)]
     parts = {} if plant is not None else rig.hardware()
-    return Grid((axes[0], axes[1], axes[2]), rig, plant or paper_plant(**parts))
+    return Grid((*axes, *further), rig, plant or paper_plant(**parts))
 
 
 def _as_axis(name: str, given: Axis | float) -> Axis:
