@@ -134,6 +134,7 @@ from .robustness.transfer import loop_transfer as loop_transfer
 from .simulation.controller import Controller as Controller
 from .simulation.drive_control import drive_controller as drive_controller
 from .simulation.drive_control import law_controller as law_controller
+from .simulation.drive_control import simulate_drive as simulate_drive
 from .simulation.energy import band_energy as band_energy
 from .simulation.floquet import floquet as floquet
 from .simulation.irregular import irregular as irregular
@@ -183,6 +184,10 @@ from .strings.drive_rules import soft_torque_control as soft_torque_control
 from .strings.drive_rules import stiff_control as stiff_control
 from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
+from .strings.drive_sampled import SampledDrive as SampledDrive
+from .strings.drive_sampled import sampled_drive as sampled_drive
+from .strings.drive_sampled import sampled_radius as sampled_radius
+from .strings.drive_stepped import SteppedDrive as SteppedDrive
 from .strings.drive_table import DriveTable as DriveTable
 from .strings.drive_table import drive_table as drive_table
 from .strings.drives import DriveComparison as DriveComparison
@@ -229,6 +234,7 @@ from .synthesis.objectives import HInfinity as HInfinity
 from .synthesis.objectives import Requirements as Requirements
 from .synthesis.objectives import Robust as Robust
 from .synthesis.objectives import SemiDiscrete as SemiDiscrete
+from .tables.export_drive import export_drive as export_drive
 from .tables.files import load_table as load_table
 from .tables.files import save_table as save_table
 from .tables.gain_table import GainTable as GainTable

@@ -142,18 +142,32 @@ def deliver_drive_table(
     InputError
         If an option is missing, wrong, or one that does not bear on drives.
     """
-    _refuse_others(structure, _TABLE_BEARS)
-    if out is not None and Path(out).suffix.lower() not in ENDINGS:
-        raise InputError("--out", out, f"a file that ends in {' or '.join(ENDINGS)} for drives")
-    for name, shown in (("rig", "drives turn a string"), ("depth", "such as '1500:4500:7 m'")):
+    from drillctrl.cli.drive_file import ENDINGS as SOURCES
+    from drillctrl.cli.drive_file import SOURCE_OPTIONS, read_settings, write_drive
+
+    source = out is not None and Path(out).suffix.lower() in SOURCES
+    _refuse_others(structure, (*_TABLE_BEARS, *(SOURCE_OPTIONS if source else ())))
+    if out is not None and not source and Path(out).suffix.lower() not in ENDINGS:
+        known = ", ".join((*ENDINGS, *SOURCES))
+        raise InputError("--out", out, f"a file that ends in one of {known} for drives")
+    needed = (("rig", "drives turn a string"), ("depth", "such as '1500:4500:7 m'"))
+    for name, shown in needed[:1] if source else needed:
         if options.get(name) is None:
             raise InputError(f"--{name}", "(missing)", f"given: {shown}")
     from drillctrl.cli.grid import read_depths
+    from drillctrl.strings.changed import string_of
     from drillctrl.strings.drive_table import drive_table
     from drillctrl.strings.files import load_rig
 
-    found = drive_table(load_rig(options["rig"]), structure, read_depths(options["depth"]))
-    _write(found, out)
+    rig = load_rig(options["rig"])
+    settings = read_settings(out, options) if source and out is not None else None
+    depth = options.get("depth")
+    depths = [string_of(rig).length] if depth is None else read_depths(depth)
+    found = drive_table(rig, structure, depths)
+    if settings is not None and out is not None:
+        write_drive(found, out, settings)
+    else:
+        _write(found, out)
     if plot is not None:
         write_figure(plot, found.plot())
     click.echo(json_text(found.to_dict()) if as_json else found.summary())

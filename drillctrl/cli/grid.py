@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.point import with_damping
-from drillctrl.cli.verb import Command, with_options
+from drillctrl.cli.verb import Command, naming, with_options
 
 if TYPE_CHECKING:
     from drillctrl.base.units import Dimension
@@ -38,11 +39,18 @@ def grid_options(command: Command) -> Command:
         click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
         click.option("--rock-strength", metavar=with_unit, help="Such as '40:80:5 MPa'."),
         click.option(
+            "--axis",
+            "further",
+            multiple=True,
+            metavar=f"NAME={_SPAN}",
+            help="A further axis, such as kappa=0.01:0.05:3; may be repeated.",
+        ),
+        click.option(
             "--depth", metavar=with_unit, help="Length of a real string: '1500:4500:7 m'."
         ),
         click.option("--mud", metavar=with_unit, help="Its mud, such as '9:13:3 ppg'."),
     ]
-    return with_options(command, options)
+    return with_options(command, options)  # fmt: skip
 
 
 def read_grid(options: dict[str, Any]) -> Grid:
@@ -56,6 +64,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
     from drillctrl.tables.grid import dimensionless_grid
 
     given = {name: value for name, value in options.items() if value is not None}
+    further = _further(options.get("further") or ())
     for name in ("depth", "mud"):
         if name in given and "rig" not in given:
             raise InputError(f"--{name}", given[name], "left out without the --rig of a string")
@@ -65,7 +74,7 @@ def read_grid(options: dict[str, Any]) -> Grid:
         first = next(iter(groups))
         raise InputError(f"--{first}", groups[first], "left out where a rig is given")
     if rig:
-        return _rig_grid(rig)
+        return _rig_grid(rig, further)
     for name in ("omega0", "delta0"):
         if name not in groups:
             raise InputError(f"--{name}", "(missing)", "given, such as 4:24:21, or else --rig")
@@ -74,10 +83,22 @@ def read_grid(options: dict[str, Any]) -> Grid:
     groups = with_damping(groups)
     axes = {name: _axis(name, str(groups.pop(name, "14")), None) for name in _GROUPS[:3]}
     corner = {name: axis.values[0] for name, axis in axes.items()}
-    return dimensionless_grid(**axes, reference=OperatingPoint(**{**corner, **groups}))
+    reference = OperatingPoint(**{**corner, **groups})
+    return dimensionless_grid(**axes, reference=reference, further=further)
 
 
-def _rig_grid(given: dict[str, str]) -> Grid:
+def _further(texts: Sequence[str]) -> list[Axis]:
+    axes = []
+    for text in texts:
+        name, equals, span = text.partition("=")
+        if not equals:
+            raise InputError("--axis", text, f"NAME={_SPAN}, such as kappa=0.01:0.05:3")
+        with naming("--axis", "axis", name.strip()):
+            axes.append(_axis("axis", span, None, name.strip()))
+    return axes
+
+
+def _rig_grid(given: dict[str, str], extra: Sequence[Axis]) -> Grid:
     from drillctrl.base import units
     from drillctrl.drilling.plausibility import plausibility_notes
     from drillctrl.strings.files import load_rig
@@ -103,7 +124,7 @@ def _rig_grid(given: dict[str, str]) -> Grid:
         if option in given
     }
     speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
-    grid = rig_grid(load_rig(given["rig"]), speed, **axes)
+    grid = rig_grid(load_rig(given["rig"]), speed, **axes, further=extra)
     points = [case.rig_point for case in grid.cases]
     notes = dict.fromkeys(n for p in points if p is not None for n in plausibility_notes(p))
     for note in list(notes)[:3]:

@@ -294,18 +294,18 @@ def _from_table(
     path: str, point: OperatingPoint, scenario: Scenario, duration: float, given: dict[str, Any]
 ) -> Controller:
     from drillctrl.tables.files import load_table
-    from drillctrl.tables.scheduling import course, scheduled
+    from drillctrl.tables.scheduling import places_of, scheduled
 
     table = load_table(path)
     ends = [change.time + change.duration for change in scenario.changes]
     instants = [0.0, *(end for end in ends if end <= duration)]
     import numpy as np
 
-    places = course(point, scenario, np.array(instants) + 2e-9)
+    places = places_of(table, point, scenario, np.array(instants))
     vouched = table.stable_at(*places.T)
     for stable, time, place in zip(vouched, instants, places.tolist(), strict=True):
         if not stable:
-            omega0, delta0, psi = place
+            omega0, delta0, psi = place[:3]
             click.echo(
                 f"drillctrl: note: the table does not vouch for ω0 = {omega0:.4g}, "
                 f"δ0 = {delta0:.4g}, ψ = {psi:.4g} from t = {time:g}: "

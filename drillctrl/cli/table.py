@@ -104,6 +104,8 @@ def table_command(
       drillctrl table --rig table1 --speed "110:120:2 rpm" --rop "50 m/h" --structure pd \\
           --objective drilling --kick 0.1 --limit "0.9 kN*m"
       drillctrl table --rig vertical-3000 --structure soft-torque --depth "2000:3000:3 m"
+      drillctrl table --rig vertical-3000 --structure soft-torque --out drive.c \\
+          --period "10 ms" --limit "40 kN*m"
 
     With --out a run that was killed goes on where it was when it is started again.
     """
@@ -125,7 +127,7 @@ def table_command(
         check_out(out, controller, result.grid, result.structure)
         checkpoint = None
     else:
-        result, checkpoint, controller = _design(options, out, controller)
+        result, checkpoint, controller = _design(options, out, plot, controller)
     if out is not None:
         writing("--out", out, lambda: write_table(result, out, controller))
     if checkpoint is not None:
@@ -148,7 +150,7 @@ def _refuse_design(ctx: click.Context) -> None:
 
 
 def _design(
-    options: dict[str, Any], out: str | None, controller: dict[str, Any]
+    options: dict[str, Any], out: str | None, plot: str | None, controller: dict[str, Any]
 ) -> tuple[GainTable, Checkpoint | None, dict[str, Any]]:
     """Return the table that the options ask for, where its designs are kept, and its units."""
     from drillctrl.base.checkpoint import Checkpoint
@@ -167,7 +169,10 @@ def _design(
     objective = read_objective(options) or Exact()
     if smooth and not isinstance(objective, Exact):
         raise InputError("smooth", smooth, f"0 with --objective {objective.name}")
-    grid = read_grid(options)
+    with naming("--axis", "axes"):
+        grid = read_grid(options)
+    if plot is not None and len(grid.axes) > 3:
+        raise InputError("--plot", plot, "left out with more than three axes")
     structure = preset_structure(options["structure"])
     scales = gain_scales(structure, grid.plant, grid.rig)
     structure = structure.with_bounds(read_bounds(options["bound"], structure, scales))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +18,17 @@ from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.result import Simulation
+from drillctrl.simulation.stepping import SteppedRun
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_law import INTEGRAL, LAW, asking_plant, without_integral
+from drillctrl.strings.drive_sampled import SampledDrive
+from drillctrl.strings.drive_stepped import SteppedDrive
 from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig
 
+DRIVE_PATH = ("measurement_delay", "actuator_lag")
 _NONE = np.zeros((1, 2))
 _ANY = np.full((1, 2), 1e12)
 SPEED_LOOP = FeedbackStructure(
@@ -200,6 +207,69 @@ def _giving_way(control: DriveControl, tracking: float | None, time: float) -> d
         proportional = rest.numerator[-1] / rest.denominator[-1]
         tracking = proportional / integral if proportional * integral > 0.0 else 1.0
     return {INTEGRAL: time / checked_number("tracking", tracking, 0.0, 1e6, open_low=True)}
+
+
+@checks_kinds
+def simulate_drive(
+    where: RigPoint,
+    law: SampledDrive,
+    *,
+    duration: float = 200.0,
+    depth: float | None = None,
+    **options: Any,
+) -> Simulation:
+    """Simulate the string under a sampled law of its drive, as the exported source computes it.
+
+    Parameters
+    ----------
+    where : RigPoint
+        A string under a top drive with inertia, and where it drills.
+    law : SampledDrive
+        Of `sampled_drive`; it feeds back what the speed is beyond that of steady drilling, and the
+        torque comes to that of steady drilling, which leaves so much less of the limit.
+    duration : float
+        Dimensionless time to simulate.
+    depth : float, optional
+        That the law is told, m; by default the length of the string.
+    **options
+        Of `SteppedRun`: scenario, initial, cutting, backwards, rtol, atol, and of the drive
+        measurement_delay and actuator_lag where they are not those of the rig's.
+
+    Raises
+    ------
+    InputError
+        If the rig has no such drive, or another than the law is for.
+    """
+    case, around = free_drive(where)
+    rig = where.rig
+    assert isinstance(rig, StringRig)
+    assert rig.drive is not None
+    if rig.drive.inertia != law.machine.inertia:
+        wanted = f"{rig.drive.inertia:g}, as the rig's"
+        raise InputError("inertia of the drive", law.machine.inertia, wanted)
+    torque, time = rig.torsional_stiffness, rig.time_scale
+    steady = float(structure_of(case).arrays.steady[1]) * torque
+    controller = SteppedDrive(law)
+    around["limit"] = checked_number("limit", law.limit, steady, open_low=True) / torque
+    run = SteppedRun(
+        case, ("dphi",), ("drive",), period=law.period / time, duration=duration,
+        **{**around, **options},
+    )  # fmt: skip
+    place = rig.string.length if depth is None else depth
+    late, lag = (float({**around, **options}[name]) * time for name in DRIVE_PATH)
+    kept = math.exp(-law.period / lag) if lag else 0.0
+    # What the drive gave when the speed was measured that is there now.
+    acting = 0.0
+    past = deque([0.0] * (1 + round(late / law.period)))
+    while run.goes_on:
+        controller.limit = law.limit - steady
+        speed = float(run.outputs()[0]) / time
+        command = controller.step(speed, 0.0, past.popleft(), place)
+        acting = kept * acting + (1.0 - kept) * command
+        past.append(acting)
+        run.hold([command / torque])
+        run.advance()
+    return run.result()
 
 
 def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:

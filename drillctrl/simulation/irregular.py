@@ -8,6 +8,7 @@ import weakref
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.linear import BIT_STATES
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
@@ -25,6 +26,7 @@ _RTOL = 1e-8
 _known: weakref.WeakKeyDictionary[Simulation, bool] = weakref.WeakKeyDictionary()
 
 
+@checks_kinds
 def irregular(run: Simulation) -> bool:
     """Return whether a motion is chaotic, as far as its last quarter shows.
 

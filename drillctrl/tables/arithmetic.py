@@ -38,14 +38,16 @@ class Cost(NamedTuple):
 def worst_cost(controller: SampledController, outputs: int) -> Cost:
     """Return the most operations of one step: switched on, between nodes that all count."""
     varying = [len(ticks) for ticks in controller.axes if len(ticks) > 1]
+    axes, corners = len(controller.axes), 2 ** len(controller.axes)
     rated = controller.settings.rate is not None
-    # Shares, weights of eight corners, and the sum over those that count.
-    lookup = 3 * len(varying) + 12 + 16 + 2 * 2 ** len(varying) * 2 * outputs
+    # Shares, weights of all corners, and the sum over those that count.
+    weights = axes * corners // 2 + (axes - 1) * corners
+    lookup = 3 * len(varying) + weights + 2 * 2 ** len(varying) * 2 * outputs
     law = 2 + 8 * outputs
     trust = 7 + 2 * rated
     clock = 3
     searches = sum(math.ceil(math.log2(size - 1)) + 2 for size in varying)
-    tests = searches + 6 + 8 + 2 * (outputs + 5) + 2 * outputs + 4 + 1
+    tests = searches + 2 * axes + corners + 2 * (outputs + axes + 2) + 2 * outputs + 4 + 1
     limits = 3 + 2 + 4 + 4 * rated + 2
     return Cost(lookup + law + trust + clock, len(varying) + 3, tests + limits)
 
@@ -67,10 +69,12 @@ def float_difference(controller: SampledController, outputs: int) -> tuple[float
     shape = [len(ticks) for ticks in controller.axes]
     gains = np.array(controller.node_gains).reshape(*shape, 2 * outputs)
     constant = np.array(controller.cell_gains).reshape(-1, 2 * outputs)
-    largest = np.abs(gains).max(axis=(0, 1, 2))
+    axes = len(shape)
+    largest = np.abs(gains).max(axis=tuple(range(axes)))
     if constant.size:
         largest = np.maximum(largest, np.abs(constant).max(axis=0))
-    wrong = 14.0 * _ROUNDING * largest + _moved(controller.axes, gains)
+    # Sums over the corners, products of shares, and shares.
+    wrong = (2**axes - 1 + 2 * axes + 1) * _ROUNDING * largest + _moved(controller.axes, gains)
     now, then = largest[:outputs], largest[outputs:]
     both = now + then
     sizes = controller.settings.limit / (outputs * np.where(both > 0.0, both, 1.0))

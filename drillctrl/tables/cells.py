@@ -130,7 +130,7 @@ def check_cells(task: CellTask) -> tuple[IntArray, Cells]:
 
 
 def _lattice(grid: Grid) -> FloatArray:
-    """Return corners, middles of edges and faces, and the centre of a unit cell, (l, 3)."""
+    """Return corners, middles of edges and faces, and the centre of a unit cell, (l, a)."""
     ticks = [(0.0, 0.5, 1.0) if size > 1 else (0.0,) for size in grid.shape]
     return np.array(list(itertools.product(*ticks)))
 
@@ -172,16 +172,16 @@ def _worst(
     directions = np.array(
         [
             sign * unit
-            for unit, size, axis in zip(np.eye(3), grid.shape, grid.axes, strict=True)
+            for unit, size, axis in zip(np.eye(len(grid.shape)), grid.shape, grid.axes, strict=True)
             for sign in (-1.0, 1.0)
             if size > 1 and axis.name not in CHANGES
         ]
-    ).reshape(-1, 3)
+    ).reshape(-1, len(grid.shape))
     if not len(directions):
         return best, spread
     for step in _STEPS:
         trials = np.clip(here[:, None] + step * directions, 0.0, 1.0)
-        flat = trials.reshape(-1, 3)
+        flat = trials.reshape(-1, len(grid.shape))
         cell = np.repeat(index, len(directions))
         at = to_coordinates(grid, np.repeat(origin, len(directions), axis=0), flat)
         values = _abscissas(grid, structure, gains, cells, cell, at).reshape(count, -1)

@@ -186,8 +186,8 @@ def from_document(document: Document, plant: Plant) -> GainTable:
         raise ValueError(f"gains for another plant, to be given when it is loaded: {made}")
     structure = _read_structure(header["structure"], plant)
     kind = {"point": OperatingPoint, "rig": Rig}[header["reference"]["kind"]]
-    axes = [Axis(name, tuple(values)) for name, values in header["axes"].items()]
-    grid = Grid((axes[0], axes[1], axes[2]), kind(**header["reference"]["values"]), plant)
+    axes = tuple(Axis(name, tuple(values)) for name, values in header["axes"].items())
+    grid = Grid(axes, kind(**header["reference"]["values"]), plant)
     gains = np.column_stack([columns[name] for name in structure.entry_names])[:, structure.free]
     _check_gains(structure, gains)
     if header["fallback"] not in FALLBACKS:

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack
 
@@ -20,10 +21,12 @@ from drillctrl.base.templates import filled
 from drillctrl.tables.export_c import check_c_name, export_c
 from drillctrl.tables.fmu_description import (
     VERSIONS,
+    Variable,
     build_description,
     description,
     source_files,
     variables,
+    verdict,
 )
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.sampled import sampled_controller
@@ -82,12 +85,70 @@ def export_fmu(
     name = Path(path).stem
     check_fmu(name, fmi)
     controller = sampled_controller(table, name, period, limit, options)
-    token = str(uuid.uuid5(uuid.NAMESPACE_OID, f"drillctrl {controller.stamp} {fmi}"))
-    listed = variables(table, controller)
-    with tempfile.TemporaryDirectory() as folder:
+    known = verdict(table, controller)
+    told = " ".join(f"{what[0].upper()}{what[1:]}: {words}." for what, words in known[:3])
+    outputs, axes = len(table.structure.outputs), len(controller.axes)
+    place = 1 + outputs
+
+    def source(folder: str) -> None:
         export_c(table, folder, name, period=period, limit=limit, **options)
-        source = Path(folder) / source_files(name)[1]
-        source.write_text(
+
+    return write_fmu(
+        path,
+        fmi,
+        source,
+        variables(table, controller),
+        known,
+        text=f"Scheduled delayed output feedback. {told}",
+        stamp=controller.stamp,
+        period=controller.settings.period,
+        arguments="&data->number[MEASURED], "
+        f"&data->number[{place}u], data->number[{place + axes}u]",
+        other_place=place + axes + 1,
+    )
+
+
+def write_fmu(
+    path: str | Path,
+    fmi: str,
+    source: Callable[[str], object],
+    listed: list[Variable],
+    known: list[tuple[str, str]],
+    *,
+    text: str,
+    stamp: str,
+    period: float,
+    arguments: str,
+    other_place: int | None = None,
+) -> Path:
+    """Compile a controller's C source behind the functions of the standard, and pack all of it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; its name is that of the model.
+    fmi : str
+        Version of the standard.
+    source : callable
+        Writes header and source of that name into a folder.
+    listed, known, text
+        As for `description`; after time and inputs come limit, period, command, switch, whether it
+        is vouched for, and status.
+    stamp : str
+        No other controller's.
+    period : float
+        Sampling period.
+    arguments : str
+        Of a step in C, after the state and before the switch.
+    other_place : int, optional
+        Value reference of what was in control before, if the state has it.
+    """
+    name = Path(path).stem
+    token = str(uuid.uuid5(uuid.NAMESPACE_OID, f"drillctrl {stamp} {fmi}"))
+    with tempfile.TemporaryDirectory() as folder:
+        source(folder)
+        interface = Path(folder) / source_files(name)[1]
+        interface.write_text(
             filled(
                 "drillctrl.tables",
                 "fmu.c.j2",
@@ -95,14 +156,19 @@ def export_fmu(
                 token=token,
                 version=fmi[0],
                 period=f"{period:.17e}",
-                place=1 + len(table.structure.outputs),
+                limit_place=next(i for i, v in enumerate(listed) if v.name == "limit"),
+                other_place=other_place,
+                arguments=arguments,
                 start=[v.start or "0.0" for v in listed if v.kind == "Float64"],
             ),
             encoding="ascii",
         )
         binary = _compiled(Path(folder), name)
+        told = description(
+            listed, known, name=name, text=text, period=period, version=fmi, token=token
+        )
         files = {
-            "modelDescription.xml": description(table, controller, name, fmi, token).encode(),
+            "modelDescription.xml": told.encode(),
             f"binaries/{_place(fmi)}/{binary.name}": binary.read_bytes(),
             **{
                 f"sources/{file}": (Path(folder) / file).read_bytes()

@@ -28,13 +28,17 @@ _VARIABLES = """
     ReleaseSamples SampleSeen SampleGood SampleEqual SampleLate SampleLost SignalFrozen
     GainTrusted GoodSample GoodPlace GoodDelay TrustedGains PastValue LimitNow StartCommand
     WantedCommand RampShare LargestInput FadeSamples HoldSamples FrozenSamples FastestChange
-    GainValues CellShare CellLow AxisIndex EntryIndex CornerA CornerB CornerC CellKind NodeIndex
+    GainValues CellShare CellLow AxisIndex EntryIndex CellKind NodeIndex
     WholeSamples NearSample FarSample CornerWeight PartSample SamplesBack InsideTable
-    SamplePeriod CommandLimit RampSamples RingDepth TicksA TicksB TicksC NodeGains CellGains
+    SamplePeriod CommandLimit RampSamples RingDepth NodeGains CellGains
     CellKinds
 """
-VARIABLES = frozenset(_VARIABLES.split())
-_DIALECTS = (
+# A letter an axis.
+LETTERS = "ABCDEFGH"
+VARIABLES = frozenset(_VARIABLES.split()) | {
+    f"{what}{letter}" for what in ("Corner", "Ticks") for letter in LETTERS
+}
+DIALECTS = (
     "IEC 61131-3, second edition, Structured Text without extensions of a vendor.",
     "Structured Control Language of Siemens (TIA Portal, S7-1500), as an external source.",
 )
@@ -107,8 +111,10 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
     gain_units = rig_gain_units(structure, plant, rig)
     si = {name: SI_UNITS[plant.quantity(name)] for name in (*structure.outputs, *structure.inputs)}
     outputs = len(structure.outputs)
-    sizes = dict(zip("ABC", map(len, controller.axes), strict=True))
-    arrays = {f"Ticks{letter}": ticks for letter, ticks in zip("ABC", controller.axes, strict=True)}
+    sizes = dict(zip(LETTERS, map(len, controller.axes), strict=False))
+    arrays = {
+        f"Ticks{letter}": ticks for letter, ticks in zip(LETTERS, controller.axes, strict=False)
+    }
     arrays["NodeGains"] = controller.node_gains
     # An array of no elements is not Structured Text.
     arrays["CellGains"] = controller.cell_gains or (0.0,)
@@ -121,7 +127,7 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
         "fading": settings.fading,
         "ends": [[_number(value) for value in pair] for pair in controller.ends()],
         "scl": scl,
-        "dialect_words": _DIALECTS[scl],
+        "dialect_words": DIALECTS[scl],
         "sizes": sizes,
         "period": _number(settings.period),
         "limit": _number(settings.limit),
@@ -141,7 +147,7 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
         else "dimensionless",
     }
     text = filled("drillctrl.tables", "controller.st.j2", **words)
-    return _with_marks(text) if scl else text
+    return with_marks(text, VARIABLES) if scl else text
 
 
 def _bench(table: GainTable, controller: SampledController, vectors: Vectors) -> str:
@@ -177,11 +183,11 @@ def _bench(table: GainTable, controller: SampledController, vectors: Vectors) ->
     )
 
 
-def _with_marks(text: str) -> str:
+def with_marks(text: str, variables: frozenset[str]) -> str:
     """Return a block with the mark # before each variable in its statements."""
     declared, body = text.split("\nBEGIN\n")
     return f"{declared}\nBEGIN\n" + re.sub(
-        rf"\b({'|'.join(sorted(VARIABLES, key=len, reverse=True))})\b", r"#\1", body
+        rf"\b({'|'.join(sorted(variables, key=len, reverse=True))})\b", r"#\1", body
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import InputError
 from drillctrl.base.figure import axis_name, new_figure
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.tables.grid import Axis, Grid
@@ -71,7 +72,14 @@ def plot_table(table: Drawn) -> Figure:
     the shortest axis, and α is drawn at each of its values, or at eight of them. Nodes that
     nothing stabilises are crosses; cells that did not pass are hatched, those with constant
     gains dotted.
+
+    Raises
+    ------
+    InputError
+        If the grid has more axes.
     """
+    if len(table.grid.axes) > 3:
+        raise InputError("plot", f"{len(table.grid.axes)} axes", "at most three")
     panels = _panels(table)
     columns = min(3, len(panels))
     rows = math.ceil(len(panels) / columns)

@@ -120,10 +120,32 @@ def verdict(table: GainTable, controller: SampledController) -> list[tuple[str, 
 
 
 def description(
-    table: GainTable, controller: SampledController, name: str, version: str, token: str
+    listed: list[Variable],
+    known: list[tuple[str, str]],
+    *,
+    name: str,
+    text: str,
+    period: float,
+    version: str,
+    token: str,
 ) -> str:
-    """Return the text of modelDescription.xml, FMI 2.0 or 3.0, for co-simulation."""
-    known = verdict(table, controller)
+    """Return the text of modelDescription.xml, FMI 2.0 or 3.0, for co-simulation.
+
+    Parameters
+    ----------
+    listed : list of Variable
+        In the order of their value references.
+    known : list of (str, str)
+        What is known of the controller, by words.
+    name, text : str
+        Of the model.
+    period : float
+        Sampling period.
+    version : str
+        Of the standard.
+    token : str
+        That of the binary.
+    """
     newer = version == "3.0"
     root = ElementTree.Element(
         "fmiModelDescription",
@@ -131,15 +153,14 @@ def description(
             "fmiVersion": version,
             "modelName": name,
             "instantiationToken" if newer else "guid": token,
-            "description": "Scheduled delayed output feedback. "
-            + " ".join(f"{what[0].upper()}{what[1:]}: {text}." for what, text in known[:3]),
+            "description": text,
             "generationTool": "drillctrl",
             **({} if newer else {"variableNamingConvention": "flat"}),
         },
     )
     abilities = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}
     if newer:
-        abilities["fixedInternalStepSize"] = repr(controller.settings.period)
+        abilities["fixedInternalStepSize"] = repr(period)
         abilities |= {"canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
     else:
         abilities |= {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"}
@@ -149,11 +170,9 @@ def description(
         files = ElementTree.SubElement(simulation, "SourceFiles")
         for file in source_files(name):
             ElementTree.SubElement(files, "File", name=file)
-    listed = variables(table, controller)
     _add_units(root, {variable.unit for variable in listed} - {""})
-    period = repr(controller.settings.period)
-    notes = [f"{what}: {text}" for what, text in known]
-    experiment = {"startTime": "0.0", "stepSize": period}
+    notes = [f"{what}: {words}" for what, words in known]
+    experiment = {"startTime": "0.0", "stepSize": repr(period)}
     ElementTree.SubElement(root, "DefaultExperiment", experiment)
     if not newer:
         notes_in = ElementTree.SubElement(root, "VendorAnnotations")

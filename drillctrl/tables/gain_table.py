@@ -112,32 +112,27 @@ class GainTable:
         """Largest change between neighbouring stable nodes or cells; see `largest_jump`."""
         return largest_jump(self.grid, self.structure, self.gains, self.sound, self.cells)
 
-    def gains_at(
-        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
-    ) -> tuple[FloatArray, FloatArray]:
+    def gains_at(self, *groups: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return interpolated gains, clamped at the edges of the grid.
 
         Parameters
         ----------
-        omega0, delta0, psi : array_like, (q,)
-            Dimensionless groups, or what stands for ψ among the grid's names; numbers are
-            repeated.
+        *groups : array_like, (q,)
+            ω0, δ0 and ψ, or whatever the grid's names are; numbers are repeated.
 
         Returns
         -------
         K1, K2 : array, (q, m, p)
         """
-        where = place(self.grid, self.grid.locate(omega0, delta0, psi))
+        where = place(self.grid, self.grid.locate(*groups))
         flat = self.entries_of(interpolated(where, self.gains, self.cells))
         half = flat.shape[1] // 2
         shape = (len(flat), *self.structure.K1_lower.shape)
         return flat[:, :half].reshape(shape), flat[:, half:].reshape(shape)
 
-    def stable_at(
-        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
-    ) -> BoolArray:
+    def stable_at(self, *groups: npt.ArrayLike) -> BoolArray:
         """Whether the table vouches for points: inside the grid, in cells that passed, (q,)."""
-        where = place(self.grid, self.grid.locate(omega0, delta0, psi))
+        where = place(self.grid, self.grid.locate(*groups))
         return np.asarray(where.inside & (self.cells.mode[where.cell] != UNSAFE))
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +45,9 @@ FIELD_UNITS = {
     "depth": ("m", 1.0),
     "mud": ("sg", 1e-3),
 }
+# Groups that further axes may go over, and how many axes there may be: a cell has 2^a corners.
+FURTHER = ("eta", "xi", "kappa", "beta")
+MOST_AXES = 8
 DIMENSIONLESS = ("omega0", "delta0", "psi")
 FEEDS = ("penetration_rate", "weight_on_bit")
 # In the place of rock: what changes the string of a rig.
@@ -114,10 +118,12 @@ class Grid:
 
     Attributes
     ----------
-    axes : tuple of three Axis
-        Named as `DIMENSIONLESS`, or ``rotary_speed``, one of `FEEDS` and one of `THIRD`, in that
-        order; a parameter of the plant's parts may take the place of ψ. The last varies fastest
-        among the nodes. Points and gains have the units of the rig whatever the depth.
+    axes : tuple of Axis
+        The first three named as `DIMENSIONLESS`, or ``rotary_speed``, one of `FEEDS` and one of
+        `THIRD`, in that order; a parameter of the plant's parts may take the place of ψ. Further
+        ones go over such parameters, over `FURTHER` of a dimensionless grid, over depth and mud
+        of a string. The last varies fastest among the nodes. Points and gains have the units of
+        the rig whatever the depth.
     reference : OperatingPoint or Rig
         What does not vary: η, ξ, κ and n of a dimensionless grid, the rig of the others.
     plant : Plant
@@ -131,7 +137,7 @@ class Grid:
 
     made_by = "dimensionless_grid makes of a point"
 
-    axes: tuple[Axis, Axis, Axis]
+    axes: tuple[Axis, ...]
     reference: OperatingPoint | Rig
     plant: Plant = None  # type: ignore[assignment]
 
@@ -143,15 +149,24 @@ class Grid:
         fitting: tuple[tuple[str, ...], ...] = tuple(
             ("rotary_speed", feed, third) for third in THIRD for feed in FEEDS
         )
+        further = {*self.plant.own, *(() if self.rig is None else CHANGES)}
         if self.rig is None:
             fitting = tuple((*DIMENSIONLESS[:2], third) for third in ("psi", *self.plant.own))
-        if names not in fitting:
+            further |= {*FURTHER}
+        if names[:3] not in fitting:
             wanted = " or ".join(", ".join(choice) for choice in fitting)
             raise InputError("axes", ", ".join(names), wanted)
-        if self.restrings:
-            # A value out of range is told before any work is done.
-            for value in self.axes[2].values:
-                restrung(self.plant, **{names[2]: value})
+        if len(names) > MOST_AXES:
+            raise InputError("axes", ", ".join(names), f"at most {MOST_AXES}")
+        for i, name in enumerate(names[3:], 3):
+            if name not in further or name in names[:i]:
+                known = ", ".join(sorted(further - {*names[:i]})) or "none, of this plant"
+                raise InputError("axes", name, f"each once, and of {known}")
+        for axis in self.axes:
+            if axis.name in CHANGES:
+                # A value out of range is told before any work is done.
+                for value in axis.values:
+                    restrung(self.plant, **{axis.name: value})
         if math.prod(self.shape) > MAX_NODES:
             raise InputError("grid", f"{math.prod(self.shape)} nodes", f"at most {MAX_NODES} nodes")
 
@@ -161,25 +176,24 @@ class Grid:
         return self.reference if isinstance(self.reference, Rig) else None
 
     @property
-    def names(self) -> tuple[str, str, str]:
-        """Parameters of the case that the three axes stand for."""
-        third = self.axes[2].name
-        return ("omega0", "delta0", "psi" if third == "rock_strength" else third)
+    def names(self) -> tuple[str, ...]:
+        """Parameters of the case that the axes stand for."""
+        named = (axis.name for axis in self.axes[2:])
+        return ("omega0", "delta0", *("psi" if name == "rock_strength" else name for name in named))
 
     @property
     def restrings(self) -> bool:
-        """Whether the third axis changes the string."""
-        return self.axes[2].name in CHANGES
+        """Whether an axis changes the string."""
+        return any(axis.name in CHANGES for axis in self.axes)
 
     @property
-    def shape(self) -> tuple[int, int, int]:
+    def shape(self) -> tuple[int, ...]:
         """Number of values on each axis."""
-        a, b, c = (len(axis.values) for axis in self.axes)
-        return a, b, c
+        return tuple(len(axis.values) for axis in self.axes)
 
     @property
     def coordinates(self) -> FloatArray:
-        """Coordinates of all nodes on the axes, (q, 3)."""
+        """Coordinates of all nodes on the axes, (q, a)."""
         mesh = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
         return np.column_stack([values.ravel() for values in mesh])
 
@@ -193,73 +207,77 @@ class Grid:
         """What drills at all nodes."""
         return tuple(self.case(*row) for row in self.coordinates.tolist())
 
-    def case(self, speed: float, feed: float, rock: float) -> Case:
-        """Return what drills at coordinates on the three axes."""
-        third, plant = self.names[2], self.plant
+    def case(self, *coordinates: float) -> Case:
+        """Return what drills at coordinates on the axes."""
+        given = dict(zip(self.names[2:], coordinates[2:], strict=True))
+        plant = self.plant.with_values(
+            **{name: value for name, value in given.items() if name in self.plant.own}
+        )
         if self.restrings:
-            plant = restrung(plant, **{third: rock})
-        elif third != "psi":
-            plant = plant.with_values(**{third: rock})
-        return Case(plant, self.point(speed, feed, rock))
+            plant = restrung(
+                plant, **{name: value for name, value in given.items() if name in CHANGES}
+            )
+        return Case(plant, self.point(*coordinates))
 
-    def point(self, speed: float, feed: float, rock: float) -> OperatingPoint:
-        """Return the operating point at coordinates on the three axes."""
+    def point(self, *coordinates: float) -> OperatingPoint:
+        """Return the operating point at coordinates on the axes."""
         if isinstance(self.reference, OperatingPoint):
-            rocks = {"psi": rock} if self.names[2] == "psi" else {}
-            return self.reference.with_changes(omega0=speed, delta0=feed, **rocks)
-        return self._rig_point(self.reference, speed, feed, rock).operating_point()
+            given = dict(zip(self.names, coordinates, strict=True))
+            groups = {k: v for k, v in given.items() if k not in self.plant.own}
+            return self.reference.with_changes(**groups)
+        return self._rig_point(self.reference, *coordinates[:3]).operating_point()
 
     def _rig_point(self, rig: Rig, speed: float, feed: float, rock: float) -> RigPoint:
-        placed = rig if self.restrings else rig.with_rock_strength(rock)
+        placed = rig.with_rock_strength(rock) if self.axes[2].name == "rock_strength" else rig
         if self.axes[1].name == "weight_on_bit":
             return rig_point_at_weight_on_bit(placed, speed, feed)
         return RigPoint(placed, speed, feed)
 
-    def place_of(self, case: Case) -> tuple[float, float, float]:
+    def place_of(self, case: Case) -> tuple[float, ...]:
         """Return the values of `names` of a case, as `locate` takes them."""
         plant, point = case.physics("a place in a table")
-        third = self.names[2]
-        if third not in CHANGES:
-            return point.omega0, point.delta0, case.parameters[third]
         hung = plant.string
-        if not isinstance(hung, PipeString):
-            raise InputError("string", type(hung).__name__, f"one of sections: it has a {third}")
-        own = hung.string.length if third == "depth" else hung.string.mud_density
-        return point.omega0, point.delta0, own
+
+        def value(name: str) -> float:
+            if name in CHANGES:
+                if not isinstance(hung, PipeString):
+                    wanted = f"one of sections: it has a {name}"
+                    raise InputError("string", type(hung).__name__, wanted)
+                return hung.string.length if name == "depth" else hung.string.mud_density
+            return float(plant.own[name] if name in plant.own else getattr(point, name))
+
+        return tuple(value(name) for name in self.names)
 
     def groups(self, coordinates: npt.ArrayLike) -> FloatArray:
-        """Return `names` at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
+        """Return `names` at coordinates on the axes in their SI units, (q, a) → (q, a)."""
         places = np.atleast_2d(np.asarray(coordinates, dtype=float))
         if self.rig is None:
             return places
         points = [self.point(*row) for row in places.tolist()]
-        found = np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
-        return np.column_stack([found[:, :2], places[:, 2]]) if self.restrings else found
+        groups = np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+        rocks = groups[:, 2:] if self.names[2] == "psi" else places[:, 2:3]
+        return np.column_stack([groups[:, :2], rocks, places[:, 3:]])
 
-    def locate(
-        self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
-    ) -> FloatArray:
-        """Return coordinates on the axes of values of `names`, (q,) each → (q, 3)."""
-        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in
-                                       (omega0, delta0, psi)))  # fmt: skip
+    def locate(self, *values: npt.ArrayLike) -> FloatArray:
+        """Return coordinates on the axes of values of `names`, (q,) each → (q, a)."""
+        if len(values) != len(self.names):
+            raise InputError("coordinates", len(values), f"those of {', '.join(self.names)}")
+        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in values))
         groups = np.column_stack([array.ravel() for array in arrays])
         rig = self.rig
         if rig is None:
             return groups
         speed = groups[:, 0] / rig.time_scale
-        if self.restrings:
-            feed = groups[:, 1] * speed * rig.axial_scale
-            if self.axes[1].name == "weight_on_bit":
-                feed = weight_on_bit(rig, speed, feed, rig.rock_strength)
-            return np.column_stack([speed, feed, groups[:, 2]])
         # ψ is proportional to the strength, the axial scale to its inverse (Eqs. 14, 16).
         unit = RigPoint(rig, 1.0, 0.0).operating_point().psi / rig.rock_strength
-        strength = groups[:, 2] / unit
+        rocks = self.names[2] == "psi"
+        strength = groups[:, 2] / unit if rocks else np.full(len(groups), rig.rock_strength)
         length = rig.axial_scale * rig.rock_strength / strength
         feed = groups[:, 1] * speed * length
         if self.axes[1].name == "weight_on_bit":
             feed = weight_on_bit(rig, speed, feed, strength)
-        return np.column_stack([speed, feed, strength])
+        third = strength if rocks else groups[:, 2]
+        return np.column_stack([speed, feed, third, groups[:, 3:]])
 
 
 @checks_kinds
@@ -270,6 +288,7 @@ def dimensionless_grid(
     reference: Where | None = None,
     *,
     parameter: Axis | None = None,
+    further: Sequence[Axis] = (),
 ) -> Grid:
     """Return a grid over dimensionless groups.
 
@@ -282,6 +301,8 @@ def dimensionless_grid(
         paper's.
     parameter : Axis, optional
         Over a parameter of the plant's parts; ψ is then a number.
+    further : sequence of Axis
+        Over further parameters of the plant's parts, or of eta, xi, kappa and beta.
 
     Raises
     ------
@@ -304,7 +325,7 @@ def dimensionless_grid(
         if len(third.values) > 1:
             raise InputError("psi", list(third.values)[:4], f"a number beside {parameter.name}")
         third = parameter
-    return Grid((axes[0], axes[1], third), here, plant or paper_plant())
+    return Grid((axes[0], axes[1], third, *further), here, plant or paper_plant())
 
 
 @checks_kinds
@@ -317,6 +338,7 @@ def rig_grid(
     rock_strength: Axis | float | None = None,
     depth: Axis | float | None = None,
     mud: Axis | float | None = None,
+    further: Sequence[Axis] = (),
 ) -> Grid:
     """Return a grid in rig units, all SI.
 
@@ -332,6 +354,8 @@ def rig_grid(
         Pa; by default that of the rig.
     depth, mud : Axis or float, optional
         Length of a string of sections, m, and density of its mud, kg/m³; by default the rig's.
+    further : sequence of Axis
+        Over parameters of the plant's parts.
 
     Raises
     ------
@@ -353,20 +377,18 @@ def rig_grid(
     assert feed is not None
     plant = plant or paper_plant(**rig.hardware())
     given = zip(THIRD, (rock_strength, depth, mud), strict=True)
-    thirds = [_as_axis(which, value) for which, value in given if value is not None]
-    varied = [axis for axis in thirds if len(axis.values) > 1]
-    if len(varied) > 1:
-        wanted = f"one value beside values of {varied[0].name}"
-        raise InputError(varied[1].name, list(varied[1].values)[:4], wanted)
-    for axis in thirds:
+    asked = [_as_axis(which, value) for which, value in given if value is not None]
+    varied = [axis for axis in asked if len(axis.values) > 1]
+    for axis in asked:
         if axis in varied:
             continue
         if axis.name in CHANGES:
             plant = restrung(plant, **{axis.name: axis.values[0]})
         else:
             rig = rig.with_rock_strength(axis.values[0])
-    third = varied[0] if varied else Axis("rock_strength", (rig.rock_strength,))
-    return Grid((_as_axis("rotary_speed", rotary_speed), _as_axis(name, feed), third), rig, plant)
+    third, *others = varied or [Axis("rock_strength", (rig.rock_strength,))]
+    axes = (_as_axis("rotary_speed", rotary_speed), _as_axis(name, feed), third)
+    return Grid((*axes, *others, *further), rig, plant)
 
 
 def _as_axis(name: str, given: Axis | float) -> Axis:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
+import operator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,9 +31,9 @@ class Place(NamedTuple):
     ----------
     cell : array, (q,)
         Flat index of the cell.
-    corners : array, (q, 8)
+    corners : array, (q, 2^a)
         Flat indices of the nodes at its corners.
-    weights : array, (q, 8)
+    weights : array, (q, 2^a)
         Multilinear, not negative, of sum 1.
     inside : array, (q,)
         False where a coordinate was clamped.
@@ -43,25 +45,24 @@ class Place(NamedTuple):
     inside: BoolArray
 
 
-def cell_shape(grid: Grid) -> tuple[int, int, int]:
+def cell_shape(grid: Grid) -> tuple[int, ...]:
     """Return the number of cells along each axis, 1 where there is but one value."""
-    a, b, c = (max(size - 1, 1) for size in grid.shape)
-    return a, b, c
+    return tuple(max(size - 1, 1) for size in grid.shape)
 
 
 def corners_of(grid: Grid) -> IntArray:
-    """Return the nodes at the corners of every cell, (c, 8)."""
+    """Return the nodes at the corners of every cell, (c, 2^a)."""
     return place(grid, middles(grid, np.arange(math.prod(cell_shape(grid))))).corners
 
 
 def middles(grid: Grid, cells: IntArray) -> FloatArray:
-    """Return the coordinates of the middles of cells, (c, 3)."""
+    """Return the coordinates of the middles of cells, (c, a)."""
     origin = np.column_stack(np.unravel_index(cells, cell_shape(grid)))
-    return to_coordinates(grid, origin, np.full((cells.size, 3), 0.5))
+    return to_coordinates(grid, origin, np.full((cells.size, len(grid.axes)), 0.5))
 
 
 def place(grid: Grid, coordinates: FloatArray) -> Place:
-    """Find cells and weights of points, (q, 3) coordinates on the axes."""
+    """Find cells and weights of points, (q, a) coordinates on the axes."""
     low, fraction = [], []
     inside = np.ones(len(coordinates), dtype=bool)
     for axis, value in zip(grid.axes, coordinates.T, strict=True):
@@ -78,11 +79,11 @@ def place(grid: Grid, coordinates: FloatArray) -> Place:
         fraction.append(np.clip(share, 0.0, 1.0))
     cell = np.ravel_multi_index(tuple(low), cell_shape(grid))
     corners, weights = [], []
-    for offset in itertools.product((0, 1), repeat=3):
+    for offset in itertools.product((0, 1), repeat=len(low)):
         node = [np.minimum(i + o, n - 1) for i, o, n in zip(low, offset, grid.shape, strict=True)]
         corners.append(np.ravel_multi_index(tuple(node), grid.shape))
         parts = [f if o else 1.0 - f for f, o in zip(fraction, offset, strict=True)]
-        weights.append(parts[0] * parts[1] * parts[2])
+        weights.append(functools.reduce(operator.mul, parts))
     return Place(cell, np.column_stack(corners), np.column_stack(weights), inside)
 
 

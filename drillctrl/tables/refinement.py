@@ -44,7 +44,7 @@ def refined_grid(grid: Grid, cells: Cells, stable: BoolArray) -> Grid:
         low = np.unique(slots) if ticks.size > 1 else np.zeros(0, dtype=np.intp)
         middles = 0.5 * (ticks[low] + ticks[low + 1]) if low.size else low
         axes.append(Axis(axis.name, tuple(np.sort([*ticks, *middles]).tolist())))
-    return dataclasses.replace(grid, axes=(axes[0], axes[1], axes[2]))
+    return dataclasses.replace(grid, axes=tuple(axes))
 
 
 def carried_over(designs: list[NodeDesign], coarse: Grid, fine: Grid) -> dict[int, NodeDesign]:

@@ -24,7 +24,7 @@ class SampledController:
     settings : Settings
         What it does beside its law.
     axes : tuple of tuple of float
-        Ticks of the three axes.
+        Ticks of the axes.
     node_gains : tuple of float
         Entries of K1, then K2, node by node, in the units of the table.
     cell_mode : tuple of int

@@ -40,6 +40,22 @@ def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> Floa
     return np.column_stack([omega0, rate / omega0, psi])
 
 
+def places_of(
+    table: GainTable, point: OperatingPoint, scenario: Scenario, instants: FloatArray
+) -> FloatArray:
+    """Return values of the names of a table's grid, just behind instants of a scenario, (q, a)."""
+    places = course(point, scenario, instants + 2e-9)
+    known = dict(zip(("omega0", "delta0", "psi"), places.T, strict=True))
+    fixed = table.grid.place_of(Case(table.grid.plant, point))
+    # Nothing in a scenario changes the plant.
+    return np.column_stack(
+        [
+            known[name] if name in known else np.full(len(instants), value)
+            for name, value in zip(table.grid.names, fixed, strict=True)
+        ]
+    )
+
+
 @checks_kinds
 def scheduled(
     table: GainTable,
@@ -103,11 +119,7 @@ def scheduled(
             # Looked up just behind the step.
             times[-1:] = [change.time]
     instants = np.array([0.0, *times])
-    places = course(point, scenario, instants + 2e-9)
-    third = table.grid.names[2]
-    if third != "psi":
-        # Nothing in a scenario changes the plant.
-        places[:, 2] = table.grid.place_of(Case(table.grid.plant, point))[2]
+    places = places_of(table, point, scenario, instants)
     K1, K2 = table.gains_at(*places.T)
     vouched = table.stable_at(*places.T)
     fixed = options.get("delay", "fixed") == "fixed"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
+import operator
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Sequence
@@ -34,7 +36,7 @@ class SteppedController:
         self._ends = controller.ends()
         self._fading = sum(_BIT[name] for name in self._set.fading)
         self._past = deque([[0.0] * outputs] * self._set.depth, self._set.depth)
-        self._good = ([0.0] * outputs, [0.0] * 3, 0.0)
+        self._good = ([0.0] * outputs, [0.0] * len(controller.axes), 0.0)
         self._gains = [0.0] * (2 * outputs)
         self._seen = False
         self._active = self._missing = self._equal = self._trust = self._releasing = 0
@@ -55,17 +57,15 @@ class SteppedController:
             low.append(index)
             share.append(min(max(part, 0.0), 1.0))
         sizes = [len(ticks) for ticks in law.axes]
-        cells = [max(size - 1, 1) for size in sizes]
-        mode = law.cell_mode[(low[0] * cells[1] + low[1]) * cells[2] + low[2]]
+        mode = law.cell_mode[_flat(low, [max(size - 1, 1) for size in sizes])]
         if mode > 0:
             return list(law.cell_gains[(mode - 1) * count : mode * count]), inside
         gains = [0.0] * count
-        for corner in itertools.product((0, 1), repeat=3):
+        for corner in itertools.product((0, 1), repeat=len(sizes)):
             parts = [s if c else 1.0 - s for s, c in zip(share, corner, strict=True)]
-            weight = parts[0] * parts[1] * parts[2]
+            weight = functools.reduce(operator.mul, parts)
             if weight > 0.0:
-                a, b, c = (i + o for i, o in zip(low, corner, strict=True))
-                node = (a * sizes[1] + b) * sizes[2] + c
+                node = _flat([i + o for i, o in zip(low, corner, strict=True)], sizes)
                 for k in range(count):
                     gains[k] += weight * law.node_gains[node * count + k]
         return gains, inside and mode >= 0
@@ -77,7 +77,7 @@ class SteppedController:
         ----------
         y : sequence of float, (p,)
             Outputs.
-        at : sequence of float, (3,)
+        at : sequence of float, (a,)
             Coordinates on the table's axes.
         delay : float
             τ0 in the unit of the period.
@@ -157,3 +157,11 @@ class SteppedController:
             then = (1.0 - part) * self._past[whole][k] + part * self._past[whole + 1][k]
             u += self._gains[k] * y + self._gains[half + k] * then
         return u, late
+
+
+def _flat(place: Sequence[int], sizes: Sequence[int]) -> int:
+    """Return the index of a place in an array of these sizes, the last axis fastest."""
+    index = 0
+    for i, size in zip(place, sizes, strict=True):
+        index = index * size + i
+    return index

@@ -28,7 +28,7 @@ class Vectors:
     ----------
     outputs : array, (n, p)
         What is measured.
-    places : array, (n, 3)
+    places : array, (n, a)
         Coordinates on the table's axes.
     delay, elapsed, other, limit : array, (n,)
         As for a step in C.

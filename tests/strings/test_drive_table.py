@@ -78,7 +78,7 @@ def test_the_table_on_the_command_line(call, tmp_path):
         (("--rig", "paper-string", "--structure", "stiff", "--depth", "2 km"), "[top_drive]"),
         (("--omega0", "9", "--delta0", "2", "--depth", "2:3:2 km"), "--depth"),
         (
-            ("--rig", "vertical-3000", "--structure", "stiff", "--depth", "2 km", "--out", "a.c"),
+            ("--rig", "vertical-3000", "--structure", "stiff", "--depth", "2 km", "--out", "a.txt"),
             "--out",
         ),
     ],

@@ -38,12 +38,17 @@ class InC:
     def __init__(self, table, folder, *, real="double", compiler="gcc", flags=(), **options):
         header, source = export_c(table, folder, "drill", real=real, **options)
         self.header, self.outputs = header.read_text(), len(table.structure.outputs)
+        self.axes = len(table.grid.axes)
         depth = int(self.header.split("_DEPTH ")[1].split()[0])
         self.kind = ctypes.c_double if real == "double" else ctypes.c_float
         reals, whole = self.kind, ctypes.c_int32
         counts = COUNTS
         fields = [("past", reals * (depth * self.outputs)), *((name, whole) for name in counts)]
-        fields += [("good_y", reals * self.outputs), ("good_at", reals * 3), ("good_delay", reals)]
+        fields += [
+            ("good_y", reals * self.outputs),
+            ("good_at", reals * self.axes),
+            ("good_delay", reals),
+        ]
         fields += [("gains", reals * (2 * self.outputs))]
         fields += [(name, reals) for name in REALS]
         self.state = type("State", (ctypes.Structure,), {"_fields_": fields})()
@@ -57,13 +62,13 @@ class InC:
 
     def lookup(self, at):
         gains = (self.kind * (2 * self.outputs))()
-        vouched = self.library.drill_lookup((self.kind * 3)(*at), gains)
+        vouched = self.library.drill_lookup((self.kind * self.axes)(*at), gains)
         return list(gains), bool(vouched)
 
     def step(self, y, at, delay, on=True, **given):
         for name, value in given.items():
             setattr(self.state, name, value)
-        values, places = (self.kind * self.outputs)(*y), (self.kind * 3)(*at)
+        values, places = (self.kind * self.outputs)(*y), (self.kind * self.axes)(*at)
         state = ctypes.byref(self.state)
         return self.library.drill_step(state, values, places, self.kind(delay), int(on))
 
@@ -180,8 +185,9 @@ class Translated:
         self.other = self.other if other is None else other
         double = ctypes.c_double
         return self.library.step(
-            (double * len(y))(*y), (double * 3)(*at), double(delay), int(on), double(self.limit),
-            double(self.period if elapsed is None else elapsed), double(self.other),
+            (double * len(y))(*y), (double * len(at))(*at), double(delay), int(on),
+            double(self.limit), double(self.period if elapsed is None else elapsed),
+            double(self.other),
         )  # fmt: skip
 
     status = property(lambda self: self.library.status())
@@ -201,7 +207,7 @@ def hostile(table, period, count, seed=0):
             kind = int(rng.integers(9))
         if kind != 3:
             y = rng.normal(size=outputs) * 10.0 ** rng.integers(-3, 3)
-        at = np.clip(at + 0.1 * (high - low) * rng.normal(size=3), low, high)
+        at = np.clip(at + 0.1 * (high - low) * rng.normal(size=low.size), low, high)
         given, place, lag = {}, at.copy(), delay
         if kind == 1:
             y = rng.choice(worst, outputs)
@@ -210,7 +216,7 @@ def hostile(table, period, count, seed=0):
         elif kind == 4:
             given["elapsed"] = float(rng.choice([*worst, -period, 0.0, 1.6 * period, -1e9]))
         elif kind == 5:
-            place[rng.integers(3)] = rng.choice([*worst, *(3 * high), *(0.1 * low)])
+            place[rng.integers(low.size)] = rng.choice([*worst, *(3 * high), *(0.1 * low)])
         elif kind == 6:
             lag = float(rng.choice([*worst, -lag, 100 * lag]))
         elif kind == 7:

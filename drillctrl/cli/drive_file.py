@@ -1,0 +1,73 @@
+"""Laws of a top drive as source for its controller: options of `drillctrl table`, and files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drillctrl.base.errors import InputError
+from drillctrl.cli.output import writing
+from drillctrl.cli.verb import naming
+
+if TYPE_CHECKING:
+    from drillctrl.strings.drive_table import DriveTable
+
+ENDINGS = (".c", ".st", ".scl", ".xml", ".fmu")
+_COUNTS = ("ramp", "fade", "hold", "watchdog", "release")
+SOURCE_OPTIONS = ("period", "limit", "rate_limit", "fmi", *_COUNTS)
+
+
+def read_settings(out: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was typed of a drive's controller, SI, before any law is designed.
+
+    Raises
+    ------
+    InputError
+        If it is out of range, or a file could not be written under the name.
+    """
+    from drillctrl.base import units
+    from drillctrl.tables.export_drive import check_drive_path
+
+    fmi = options["fmi"]
+    if fmi is not None and Path(out).suffix.lower() != ".fmu":
+        raise InputError("--fmi", fmi, "left out unless --out ends in .fmu")
+    with naming("--out", "name", "out"):
+        check_drive_path(out, fmi or "3.0")
+    if options["period"] is None:
+        raise InputError("--period", "(missing)", f"given for {out}, such as '10 ms'")
+    dimensions = (
+        ("period", units.TIME), ("limit", units.TORQUE), ("rate_limit", units.TORQUE_RATE)
+    )  # fmt: skip
+    given = {
+        name: units.to_si(f"--{name.replace('_', '-')}", options[name], dimension)
+        for name, dimension in dimensions
+        if options[name] is not None
+    }
+    given |= {name: options[name] for name in _COUNTS if options[name] is not None}
+    return {**given, "fmi": fmi or "3.0"}
+
+
+def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> None:
+    """Write the source of a drive's controller.
+
+    Raises
+    ------
+    InputError
+        If a law cannot be sampled so, or the file not be written.
+    """
+    from drillctrl.strings.drive_sampled import sampled_drive, sampled_radius
+    from drillctrl.tables.export_drive import export_drive
+
+    given = {name: value for name, value in settings.items() if name != "fmi"}
+    controls = [drive.control for drive in found.drives]
+    law = sampled_drive(controls, depths=found.depths, **given)
+    radius = sampled_radius(law, found.rig.string.torsion.wave_impedance)  # type: ignore[attr-defined]
+    if radius > 1.0 + 1e-6:
+        wanted = f"shorter: with it drive and pipe alone swing up, {radius:.3g}-fold a sample"
+        raise InputError("--period", f"{law.period:g} s", wanted)
+
+    def write() -> None:
+        export_drive(law, out, fmi=settings["fmi"])
+
+    writing("--out", out, write)

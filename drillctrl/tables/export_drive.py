@@ -1,0 +1,221 @@
+"""The law of a top drive as source for its controller: C, Structured Text, FMU."""
+
+from __future__ import annotations
+
+import contextlib
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from drillctrl.base.errors import InputError
+from drillctrl.base.files import replacing
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.templates import filled
+from drillctrl.strings.drive_sampled import DRIVE_BITS, SampledDrive
+from drillctrl.tables.export_c import check_c_header, check_c_name
+from drillctrl.tables.export_fmu import check_fmu, write_fmu
+from drillctrl.tables.export_st import DIALECTS, with_marks
+from drillctrl.tables.fmu_description import Variable
+from drillctrl.tables.plcopen import plcopen_text
+from drillctrl.tables.reserved import is_identifier
+
+ENDINGS = (".c", ".st", ".scl", ".xml", ".fmu")
+# What the block declares, so that its own name is none of these.
+_VARIABLES = """
+    MeasuredSpeed WantedSpeed GivenTorque StringDepth Enable TighterLimit ElapsedTime
+    TorqueCommand Vouched StatusBits LawStates MovedStates GoodSpeed GoodWanted GoodTorque
+    GoodDepth SlowSpeed SlowTorque SpeedBefore ErrorBefore SpeedError PipeTorque LawValue
+    ValueBefore LawIntegral IntegralChange StartTorque WantedTorque HeldTorque BeyondTorque
+    LimitNow RampShare SumOfStates LawNow LawBefore RowIndex EntryIndex ActiveSamples
+    MissingSamples EqualSamples TrustSamples ReleaseSamples SampleSeen SampleGood SampleEqual
+    SampleLost SampleLate SignalFrozen SignalTrusted TorqueFollowed SamplePeriod TorqueLimit
+    MostIntegral LowestDepth HighestDepth LargestSpeed LargestGiven LargestDepth
+    LargestTorque SpeedToTorque SpeedKept SpeedTaken TorqueKept TorqueTaken
+    RampSamples FadeSamples HoldSamples FrozenSamples
+    FastestChange LawEdges AtRest ByInput ByState FromInput FromState IntegralGain
+"""
+VARIABLES = frozenset(_VARIABLES.split())
+
+
+@checks_kinds
+def export_drive(law: SampledDrive, path: str | Path, *, fmi: str = "3.0") -> Path:
+    """Write the law of a top drive as source for its controller.
+
+    All languages compute what `SteppedDrive` does: the law by the trapezoidal rule, an integral
+    that neither winds up at the limits of torque and rate nor bumps when the law takes over, from
+    others or from that of another depth, and a torque that falls where signals are lost or frozen.
+
+    Parameters
+    ----------
+    law : SampledDrive
+        Of `sampled_drive`.
+    path : str or Path
+        The file: ``.c`` (with ``.h``), ``.st`` (IEC 61131-3), ``.scl`` (Siemens), ``.xml``
+        (PLCopen) or ``.fmu`` (for co-simulation); its name is that of function, block or model.
+    fmi : {"3.0", "2.0"}
+        Version of the standard of an .fmu.
+
+    Raises
+    ------
+    InputError
+        If the ending or the name is none of these, or there is a ``NAME.h`` of someone else's.
+    OSError
+        If a file cannot be written.
+    """
+    check_drive_path(path, fmi)
+    where = Path(path)
+    ending = where.suffix.lower()
+    if ending == ".c":
+        _write_c(law, where.parent, where.stem)
+    elif ending == ".fmu":
+        _write_fmu(law, where, fmi)
+    else:
+        text = filled(
+            "drillctrl.tables",
+            "drive.st.j2",
+            **_words(law, where.stem, "{:.17E}"),
+            scl=ending == ".scl",
+            dialect_words=DIALECTS[ending == ".scl"],
+        )
+        if ending == ".scl":
+            text = with_marks(text, VARIABLES)
+        elif ending == ".xml":
+            text = plcopen_text(where.stem, [text])
+        with replacing(where) as file:
+            file.write(text.encode("utf-8"))
+    return where
+
+
+def check_drive_path(path: str | Path, fmi: str = "3.0") -> None:
+    """Raise `InputError` unless the law of a drive can be written under a name."""
+    where = Path(path)
+    ending = where.suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError("out", str(path), f"a file that ends in {', '.join(ENDINGS)}")
+    if ending == ".c":
+        check_c_name(where.stem)
+        check_c_header(where.with_suffix(".h"))
+    elif ending == ".fmu":
+        check_fmu(where.stem, fmi)
+    elif not is_identifier(where.stem) or where.stem.upper() in {v.upper() for v in VARIABLES}:
+        wanted = "an identifier of at most 32 characters that is no word of Structured Text"
+        raise InputError("name", where.stem, f"{wanted} or its libraries, such as soft_torque")
+
+
+def _write_c(law: SampledDrive, folder: str | Path, name: str) -> None:
+    words = _words(law, name, "{:.17e}")
+    labels = {
+        "LawEdges": "edges", "AtRest": "at_rest", "ByInput": "by_input", "ByState": "by_state",
+        "FromInput": "from_input", "FromState": "from_state", "IntegralGain": "gain",
+    }  # fmt: skip
+    words["arrays"] = {labels[label]: values for label, values in words["arrays"].items()}
+    with contextlib.ExitStack() as stack:
+        for template in ("drive.h.j2", "drive.c.j2"):
+            target = Path(folder) / f"{name}.{template.split('.')[1]}"
+            text = filled("drillctrl.tables", template, **words)
+            stack.enter_context(replacing(target)).write(text.encode("ascii"))
+
+
+def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
+    """Return what the templates name; numbers in the form of the language."""
+    number = form.format
+    arrays = {
+        "LawEdges": law.edges or (0.0,),
+        "AtRest": [v for node in law.nodes for v in node.E.ravel().tolist()],
+        "ByInput": [v for node in law.nodes for v in node.D.tolist()],
+        "ByState": [v for node in law.nodes for v in node.C.tolist()],
+        "FromInput": [v for node in law.nodes for v in node.G.ravel().tolist()],
+        "FromState": [v for node in law.nodes for v in node.F.ravel().tolist()],
+        "IntegralGain": [node.K for node in law.nodes],
+    }
+    stiff, kept, new, held = law.filters
+    return {
+        "name": name,
+        "law": drive_words(law),
+        "care": _care(law),
+        "period_s": law.period,
+        "limit_nm": law.limit,
+        "period": number(law.period),
+        "limit": number(law.limit),
+        "most": number(law.most),
+        "lowest": number(law.ends[0]),
+        "highest": number(law.ends[1]),
+        "largest": [number(value) for value in law.largest],
+        "filters": [number(value) for value in (stiff, kept, new, held, 1.0 - held)],
+        "rate": "" if law.rate is None else number(law.rate),
+        "order": law.order,
+        "laws": len(law.nodes),
+        "integrates": law.integrates,
+        "bits": DRIVE_BITS,
+        "fading": ("LOST", "FROZEN") if law.watched else ("LOST",),
+        "stamp": law.stamp,
+        "arrays": {label: [number(value) for value in values] for label, values in arrays.items()},
+        **{name: getattr(law, name) for name in ("ramp", "fade", "hold", "frozen", "release")},
+    }
+
+
+def drive_words(law: SampledDrive) -> list[str]:
+    """Say in lines what the law is, at each depth, in ASCII."""
+    lines = [f"{law.name}, on a drive of {law.machine.inertia:g} kg m2"]
+    for depth, words in zip(law.depths, law.words, strict=True):
+        place = f"{depth:g} m: " if len(law.depths) > 1 else ""
+        plain = words.replace("·", " ").replace("²", "2").replace("−", "-")
+        lines += textwrap.wrap(place + plain.encode("ascii", "replace").decode(), 76)
+    return lines
+
+
+def _care(law: SampledDrive) -> list[str]:
+    lost = f"the torque falls to 0 over {law.fade} samples"
+    text = [
+        f"{law.hold} samples that are none, or beyond {law.largest[0]:g} rad/s or "
+        f"{law.largest[2]:g} N m, in a row are replaced by the last good one, then "
+        f"{lost}.",
+        f"{law.frozen} equal speeds in a row: {lost if law.watched else 'reported'}.",
+        "The integral takes only what a limit lets through, and starts from "
+        "the torque that the drive gives.",
+    ]
+    if law.rate is not None:
+        text.append(f"The torque changes by at most {law.rate:g} N m a sample.")
+    if law.release:
+        text.append(f"Switched off, it falls to 0 over {law.release} samples.")
+    return textwrap.wrap(" ".join(text), 76)
+
+
+def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
+    limit, (low, high) = law.limit, law.ends
+    depth = law.depths[0]
+    ranged = {} if len(law.depths) == 1 else {"low": low, "high": high}
+    status = "sum of " + "; ".join(f"{value}: {words}" for _, value, words in DRIVE_BITS)
+
+    def given(name: str, text: str, unit: str, start: str = "0.0", **more: Any) -> Variable:
+        return Variable(name, "Float64", "input", "discrete", start, text, unit, **more)
+
+    listed = [
+        Variable("time", "Float64", "independent", "continuous", "", "Time", "s"),
+        given("speed", "measured speed of the drive", "rad/s"),
+        given("set_point", "speed that is wanted", "rad/s"),
+        given("torque", "what the drive gave since the last sample", "N.m"),
+        given("depth", "length of the string, which picks the law", "m", repr(depth), **ranged),
+        Variable("limit", "Float64", "parameter", "tunable", repr(limit),
+                 "largest magnitude of the torque", "N.m", 0.0, limit),
+        Variable("period", "Float64", "local", "constant", repr(law.period),
+                 "sampling period: a step takes a whole number of these", "s"),
+        Variable("u", "Float64", "output", "discrete", "0.0", "torque of the drive", "N.m",
+                 -limit, limit),
+        Variable("enable", "Boolean", "input", "discrete", "false", "whether it is switched on"),
+        Variable("vouched", "Boolean", "output", "discrete", "false",
+                 "whether there is a law for the depth"),
+        Variable("status", "Int32", "output", "discrete", "0", status, "", 0, 255),
+    ]  # fmt: skip
+    words = " ".join(drive_words(law))
+    write_fmu(
+        path,
+        fmi,
+        lambda folder: _write_c(law, folder, path.stem),
+        listed,
+        [("law", words), ("method", "trapezoidal rule"), ("care", " ".join(_care(law)))],
+        text=f"Control of a top drive. Law: {words}.",
+        stamp=law.stamp,
+        period=law.period,
+        arguments=", ".join(f"data->number[{i}u]" for i in range(1, 5)),
+    )

@@ -1,0 +1,451 @@
+"""Laws of a top drive: the same torque in every language, and that of the continuous law."""
+
+import ctypes
+import itertools
+import subprocess
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    DriveMachine,
+    InputError,
+    RigPoint,
+    Transfer,
+    changed_rig,
+    cli,
+    drive_control,
+    export_drive,
+    law_controller,
+    pi_control,
+    sampled_drive,
+    sampled_radius,
+    simulate,
+    simulate_drive,
+    string_preset,
+    transfer_control,
+)
+from drillctrl.strings.drive_stepped import SteppedDrive
+from drillctrl.tables.reserved import is_identifier
+
+from .exported import FLAGS, compiled
+from .iec import Block, load
+
+RIG = string_preset("vertical-3000")
+DRIVE = RIG.drive
+PIPE = RIG.string.torsion.wave_impedance
+NAMES = ("soft-torque", "z-torque", "dynamic-2", "observer-1")
+LIMIT = 40e3
+CARE = {"fade": 7, "hold": 2, "watchdog": 5, "rate_limit": 4e6, "release": 6, "ramp": 9}
+
+
+@pytest.fixture(scope="module")
+def laws():
+    """One a kind, over three depths, and two that have no integral or no states."""
+    rigs = [changed_rig(RIG, depth=depth) for depth in (2000.0, 2600.0, 3000.0)]
+    found = {}
+    for name in NAMES:
+        controls = [drive_control(name, rig) for rig in (rigs if name != "dynamic-2" else rigs[:1])]
+        depths = (2000.0, 2600.0, 3000.0)[: len(controls)]
+        found[name] = sampled_drive(controls, period=5e-3, limit=LIMIT, depths=depths, **CARE)
+    own = transfer_control(DRIVE, Transfer((900.0, 4e3), (0.05, 1.0)))
+    found["own"] = sampled_drive(own, period=5e-3, limit=8e3)
+    found["resistance"] = sampled_drive(
+        [pi_control(DRIVE, factor * PIPE, 0.0) for factor in (2.0, 3.0)], period=0.02, limit=5e3,
+        depths=(1000.0, 2000.0), ramp=20,
+    )  # fmt: skip
+    return found
+
+
+# A library of a name that was loaded already would be taken for that one.
+SERIAL = itertools.count()
+
+
+class InC:
+    REALS = ("slow", "drag", "speed", "error", "integral", "start", "command")
+    COUNTS = ("node", "active", "tracking", "vouched", "status", "seen", "missing", "equal",
+              "trust", "releasing")  # fmt: skip
+
+    def __init__(self, law, folder, compiler="gcc", flags=()):
+        export_drive(law, Path(folder) / "drive.c")
+        double, whole = ctypes.c_double, ctypes.c_int32
+        fields = [("x", double * law.order), ("good", double * 4)]
+        fields += [(name, double) for name in self.REALS] + [(n, whole) for n in self.COUNTS]
+        fields += [("limit", double), ("elapsed", double)]
+        self.state = type("State", (ctypes.Structure,), {"_fields_": fields})()
+        binary = Path(folder) / f"drive_{next(SERIAL)}.so"
+        source = Path(folder) / "drive.c"
+        self.library = compiled([source], binary, *FLAGS, *flags, compiler=compiler)
+        self.library.drive_step.restype = double
+        self.library.drive_init(ctypes.byref(self.state))
+
+    def step(self, speed, set_point, torque, depth, on, **given):
+        for name, value in given.items():
+            setattr(self.state, name, value)
+        values = map(ctypes.c_double, (speed, set_point, torque, depth))
+        return self.library.drive_step(ctypes.byref(self.state), *values, int(on))
+
+    status = property(lambda self: self.state.status)
+    vouched = property(lambda self: bool(self.state.vouched))
+
+
+class InPython:
+    def __init__(self, law, folder):
+        self._steps = SteppedDrive(law)
+
+    def step(self, speed, set_point, torque, depth, on, **given):
+        for name, value in given.items():
+            setattr(self._steps, name, value)
+        return self._steps.step(speed, set_point, torque, depth, on)
+
+    status = property(lambda self: self._steps.status)
+    vouched = property(lambda self: self._steps.vouched)
+
+
+class InST:
+    ending = ".st"
+
+    def __init__(self, law, folder):
+        path = export_drive(law, Path(folder) / f"drive{self.ending}")
+        self.block, self.law = Block(load(path.read_text())["DRIVE"]), law
+
+    def step(self, speed, set_point, torque, depth, on, **given):
+        names = {"limit": "TighterLimit", "elapsed": "ElapsedTime"}
+        given = {names[name]: value for name, value in given.items()}
+        given.setdefault("ElapsedTime", self.law.period)
+        self.block(
+            MeasuredSpeed=speed, WantedSpeed=set_point, GivenTorque=torque, StringDepth=depth,
+            Enable=bool(on), **given,
+        )  # fmt: skip
+        return self.block.TORQUECOMMAND
+
+    status = property(lambda self: self.block.STATUSBITS)
+    vouched = property(lambda self: self.block.VOUCHED)
+
+
+class InScl(InST):
+    ending = ".scl"
+
+
+def hostile(law, count, seed=0):
+    """Yield what a broken encoder, clock or operator may hand to a drive."""
+    rng = np.random.default_rng(seed)
+    worst = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e15, -1e14, 1e12, 0.0, -0.0, 5e-324)
+    low, high = law.depths[0], law.depths[-1]
+    speed, wanted, torque, depth, on, kind = 12.0, 12.0, 5e3, 0.5 * (low + high), True, 0
+    for _ in range(count):
+        if rng.random() < 0.08:
+            kind = int(rng.integers(10))
+        given = {}
+        if kind != 3:
+            speed = 12.0 + 3.0 * rng.normal()
+        torque += 100.0 * rng.normal()
+        depth = float(np.clip(depth + 50.0 * rng.normal(), low - 20.0, high + 20.0))
+        sample = [speed, wanted, torque, depth]
+        if kind == 1:
+            sample[rng.integers(4)] = float(rng.choice(worst))
+        elif kind == 2:
+            sample[0] *= float(rng.choice((-1.0, 1.0)))
+        elif kind == 4:
+            given["elapsed"] = float(rng.choice([*worst, -law.period, 1.7 * law.period]))
+        elif kind == 5:
+            wanted = float(rng.choice((0.0, 6.0, 18.0)))
+        elif kind == 6:
+            sample[3] = float(rng.choice((0.0, 1e4, -5.0)))
+        elif kind == 7:
+            on = bool(rng.integers(2))
+        elif kind == 8:
+            given["limit"] = float(rng.choice([*worst, 1e3]))
+        elif kind == 9:
+            sample[2] = float(rng.choice((-7e4, 0.0, 7e4)))
+        if kind != 8:
+            given["limit"] = 1e9
+        yield *sample, on, given
+
+
+@pytest.mark.parametrize("name", [*NAMES, "own", "resistance"])
+def test_every_language_gives_the_same_torque(laws, tmp_path, name):
+    law, kinds = laws[name], (InC, InST, InScl)
+    reference = InPython(law, tmp_path)
+    others = [kind(law, tmp_path) for kind in kinds]
+    seen, largest = 0, 0.0
+    for *sample, on, given in hostile(law, 700, seed=2):
+        expected = reference.step(*sample, on, **given)
+        seen, largest = seen | reference.status, max(largest, abs(expected))
+        assert abs(expected) <= law.limit
+        for other in others:
+            u = other.step(*sample, on, **given)
+            assert u == pytest.approx(expected, rel=1e-12, abs=1e-12 * LIMIT), type(other)
+            assert (other.status, other.vouched) == (reference.status, reference.vouched)
+    assert largest == law.limit
+    wanted = 2 + 4 + 16 + 128 + (8 + 64 if law.rate else 0) + (len(law.depths) > 1)
+    assert seen & wanted == wanted
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_ten_thousand_hostile_samples_stay_within_the_limit(laws, tmp_path, tool, compiler):
+    """And two good minutes later it holds the speed again."""
+    tool(compiler)
+    for name in ("soft-torque", "z-torque", "observer-1"):
+        law = laws[name]
+        steps, python = InC(law, tmp_path, compiler), InPython(law, tmp_path)
+        for *sample, on, given in hostile(law, 10_000):
+            u = steps.step(*sample, on, **given)
+            python.step(*sample, on, **given)
+            limit = given.get("limit", LIMIT)
+            assert abs(u) <= min(LIMIT, max(limit, 0.0) if limit < LIMIT else LIMIT)
+            if np.isnan(sample).any():
+                assert steps.status & (2 | 4)
+        # A drive on endless pipe, from where the last sample found it.
+        speed, u = 12.0, 0.0
+        for _ in range(int(120.0 / law.period)):
+            u = steps.step(speed, 12.0, u, law.depths[0], True, limit=1e9)
+            speed += law.period * (u - 5e3 - PIPE * (speed - 12.0)) / DRIVE.inertia
+        assert steps.status == 0
+        assert (speed, u) == (pytest.approx(12.0, abs=0.5), pytest.approx(5e3, rel=0.1))
+
+
+def test_the_source_is_clean_under_sanitizers_and_cppcheck(laws, tmp_path, tool):
+    tool("cppcheck")
+    for law in laws.values():
+        export_drive(law, tmp_path / "drive.c")
+        main = (
+            '#include "drive.h"\nint main(void) { drive_state s; double u = 0.0; int k;'
+            " drive_init(&s); for (k = 0; k < 900; k++) { u = drive_step(&s, (k % 7) * 3.0,"
+            " 12.0, u, k * 4.0, (k % 90) < 80); } return (u > 1e9) ? 1 : 0; }\n"
+        )
+        (tmp_path / "main.c").write_text(main)
+        for compiler in ("gcc", "clang"):
+            build = [compiler, *FLAGS, "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+                     "-o", "run", "main.c", "drive.c"]  # fmt: skip
+            subprocess.run(build, cwd=tmp_path, check=True)
+            subprocess.run(["./run"], cwd=tmp_path, check=True)
+        check = ["cppcheck", "--error-exitcode=1", "--enable=warning,style,performance", "-q",
+                 "--suppress=knownConditionTrueFalse", "drive.c"]  # fmt: skip
+        subprocess.run(check, cwd=tmp_path, check=True)
+
+
+@pytest.mark.parametrize("name", ["soft-torque", "z-torque", "observer-1"])
+def test_the_sampled_law_becomes_the_continuous_one_as_the_period_shrinks(name):
+    """The held torque is half a period late: first order, with the string in the loop."""
+    where, unit = RigPoint(RIG, 12.0, 10.0 / 3600.0), RIG.time_scale
+    control = drive_control(name, RIG)
+    options = {"duration": 1.6 / unit, "initial": {"dtheta": 2.0}, "rtol": 1e-7}
+    case, continuous = law_controller(where, control)
+    expected = simulate(case, continuous, **options)
+    at = np.linspace(0.0, 1.6 / unit, 400)
+    exact, apart = expected.at(at, ("phi",)).phi, []
+    for period in (4e-3, 2e-3, 1e-3):
+        law = sampled_drive(control, period=period, limit=100e3)
+        run = simulate_drive(where, law, **options)
+        apart.append(abs(run.at(at, ("phi",)).phi - exact).max() / abs(exact).max())
+    assert apart[2] < 1e-2
+    assert np.log2(np.array(apart[:-1]) / apart[1:]).min() > 0.9
+
+
+def test_the_law_itself_is_of_second_order():
+    """Against its exact answer to a ramp of speed, with what the drive gives known."""
+    control = drive_control("z-torque", RIG)
+    end, errors = 0.2, []
+    for period in (4e-3, 2e-3, 1e-3):
+        law = sampled_drive(control, period=period, limit=1e9)
+        steps = SteppedDrive(law)
+        for k in range(1 + round(end / period)):
+            u = steps.step(0.5 * k * period, 0.0, 0.0)
+        exact = -0.5 * _ramp(control.speed, end)
+        machine = control.machine
+        through = Transfer((machine.inertia, 0.0), (machine.torque_filter, 1.0))
+        exact += 0.5 * _ramp(_product(through, control.torque), end)
+        errors.append(abs(u - exact) / abs(exact))
+    assert errors[-1] < 1e-3
+    assert np.log2(np.array(errors[:-1]) / errors[1:]).min() > 1.9
+
+
+def _product(first, second):
+    return Transfer(
+        tuple(np.polymul(first.numerator, second.numerator)),
+        tuple(np.polymul(first.denominator, second.denominator)),
+    )
+
+
+def _ramp(law, time):
+    """The answer to a ramp of slope 1, by partial fractions of G(s)/s²."""
+    import scipy.signal
+
+    below = np.polymul(law.denominator, [1.0, 0.0, 0.0])
+    residues, poles, _ = scipy.signal.residue(law.numerator, below, tol=1e-6)
+    total, power = 0.0, 0
+    for i, (residue, pole) in enumerate(zip(residues, poles, strict=True)):
+        power = power + 1 if i and abs(pole - poles[i - 1]) < 1e-6 else 0
+        total += residue * time**power * np.exp(pole * time) / np.prod(np.arange(1, power + 1))
+    return float(np.real(total))
+
+
+def test_it_takes_over_hands_over_and_does_not_wind_up(laws):
+    law = laws["soft-torque"]
+    steps = SteppedDrive(replace(law, rate=None))
+    for k in range(50):
+        assert steps.step(11.0 + 0.01 * np.sin(k), 12.0, 7e3, 2000.0, on=False) == 0.0
+    # From the torque of whatever was in control, at a speed that is not yet the set point.
+    first = steps.step(11.0, 12.0, 7e3, 2000.0)
+    assert first == pytest.approx(7e3)
+    before = u = first
+    for k in range(200):
+        before, u = u, steps.step(11.9 + 1e-4 * (k % 2), 12.0, u, 2000.0)
+    # Another depth: the integral takes the difference.
+    after = steps.step(11.9, 12.0, u, 3000.0)
+    assert after - u == pytest.approx(u - before, rel=0.5, abs=2.0)
+    assert SteppedDrive(law).step(11.9, 12.0, 0.0, 3000.0) != pytest.approx(after, rel=1e-3)
+    # Stalled for a minute at the limit, it lets go as soon as the speed is beyond the set point.
+    for k in range(12_000):
+        u = steps.step(1e-6 * (k % 2), 12.0, u, 3000.0)
+    assert (u, steps.status) == (LIMIT, 128)
+    after_stall = [steps.step(12.0 + 0.02 * k, 12.0, u, 3000.0) for k in range(1, 60)]
+    assert after_stall[-1] < LIMIT - 500.0
+    wound_up = law.nodes[2].K * 12.0 * 60.0
+    assert wound_up > 20 * LIMIT
+
+
+def test_a_lost_encoder_takes_the_torque_away_and_comes_back_without_a_bump(laws):
+    law = laws["soft-torque"]
+    steps, u = SteppedDrive(law), 6e3
+    for k in range(100):
+        u = steps.step(12.0 + 1e-6 * (k % 2), 12.0, u, 2000.0)
+    assert u == pytest.approx(6e3, rel=1e-3)
+    lost = [steps.step(np.nan, 12.0, u, 2000.0) for _ in range(law.hold + law.fade)]
+    assert lost[: law.hold] == pytest.approx([u] * law.hold, rel=1e-3)
+    falls = [lost[law.hold - 1] * (law.fade - k) / law.fade for k in range(1, law.fade + 1)]
+    assert lost[law.hold :] == pytest.approx(falls, abs=1e-9)
+    back = steps.step(9.0, 12.0, 0.0, 2000.0)
+    assert (back, steps.status) == (pytest.approx(0.0, abs=1e-9), 0)
+    frozen = [steps.step(9.0, 12.0, 0.0, 2000.0) for _ in range(5)]
+    assert steps.status & 8
+    assert abs(frozen[-1]) < abs(frozen[-2])
+
+
+def test_a_period_that_is_too_long_for_the_law_is_told():
+    """Against the simulator: what grows on endless pipe grows on the string."""
+    where, unit = RigPoint(RIG, 12.0, 10.0 / 3600.0), RIG.time_scale
+    control = drive_control("z-torque", RIG)
+    for period, grows in ((5e-3, False), (2e-2, True)):
+        law = sampled_drive(control, period=period, limit=1e6)
+        assert (sampled_radius(law, PIPE) > 1.0) == grows
+        run = simulate_drive(where, law, duration=2.0 / unit, initial={"dphi": 0.01}, rtol=1e-5)
+        assert (abs(run.motion.drive).max() * RIG.torsional_stiffness > 1e5) == grows
+    # A drive alone, J ω' = u held, under u = −Kp ω: 1 − Kp T/J.
+    alone = DriveMachine(1000.0, torque_filter=0.5)
+    for gain in (1e4, 3e4):
+        law = sampled_drive(pi_control(alone, gain, 0.0), period=0.1, limit=1.0)
+        expected = max(abs(1.0 - gain * 0.1 / 1000.0), 1.0)
+        assert sampled_radius(law, 1e-9) == pytest.approx(expected, rel=1e-2)
+
+
+def test_the_unit_is_valid_and_gives_the_same_torque(laws, tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.validation import validate_fmu
+
+    law = laws["z-torque"]
+    rng = np.random.default_rng(1)
+    count = 400
+    signals = np.zeros(
+        count,
+        dtype=[(n, float) for n in ("time", "speed", "set_point", "torque", "depth")]
+        + [("enable", bool)],
+    )
+    signals["time"] = np.arange(count) * law.period
+    signals["speed"] = 12.0 + np.cumsum(0.02 * rng.normal(size=count))
+    signals["set_point"], signals["torque"] = 12.0, 8e3 + 100.0 * rng.normal(size=count)
+    signals["depth"] = np.where(np.arange(count) < 200, 2000.0, 2700.0)
+    signals["enable"] = np.arange(count) > 20
+    steps = SteppedDrive(law)
+    expected = [steps.step(*map(float, list(row)[1:5]), bool(row[5])) for row in signals.tolist()]
+    for fmi in ("3.0", "2.0"):
+        path = export_drive(law, tmp_path / "drive.fmu", fmi=fmi)
+        assert validate_fmu(str(path)) == []
+        found = fmpy.simulate_fmu(
+            str(path), start_time=0.0, stop_time=(count - 1) * law.period,
+            step_size=law.period, output_interval=law.period, input=signals, output=["u"],
+        )  # fmt: skip
+        # u after a step is the torque from its beginning on.
+        assert found["u"][1:] == pytest.approx(expected[: count - 1], rel=1e-12, abs=1e-9)
+    with zipfile.ZipFile(path) as archive:
+        told = archive.read("modelDescription.xml").decode()
+    assert "trapezoidal rule" in told
+    assert 'unit="N.m"' in told
+
+
+def test_blark_takes_the_block_and_no_name_is_taken(laws, tmp_path):
+    blark = pytest.importorskip("blark")
+    blark.parse_source_code(export_drive(laws["own"], tmp_path / "plain.st").read_text())
+    for name in ("z-torque", "own"):
+        text = export_drive(laws[name], tmp_path / "soft_drive.st").read_text()
+        declared = [line.split(" : ")[0].strip() for line in text.splitlines() if " : " in line]
+        assert len(declared) > 60
+        assert all(is_identifier(word) for word in declared)
+        xml = export_drive(laws[name], tmp_path / "soft_drive.xml").read_text()
+        assert 'pouType="functionBlock"' in xml
+        assert xml.count("<variable ") == len(declared)
+
+
+@pytest.mark.parametrize(
+    ("given", "parameter"),
+    [
+        ({"period": 0.0}, "period"), ({"limit": None}, "limit"), ({"depths": (1.0, 2.0)}, "depths"),
+        ({"rate_limit": -1.0}, "rate_limit"), ({"watchdog": 0}, "watchdog"),
+        ({"hold": 1.5}, "hold"),
+    ],
+)  # fmt: skip
+def test_what_no_drive_can_do_is_refused(given, parameter):
+    control = pi_control(DRIVE, 1e3, 1e3)
+    with pytest.raises(InputError, match=parameter):
+        sampled_drive(control, **{"period": 0.01, "limit": 1e4, **given})
+
+
+def test_laws_that_differentiate_or_grow_are_refused(tmp_path):
+    lagging = replace(DRIVE, lag=0.01)
+    for control in (
+        pi_control(lagging, 1e3, 1e3, 500.0),
+        transfer_control(DRIVE, Transfer((1.0,), (1.0, -1.0))),
+        transfer_control(DRIVE, Transfer((1.0,), (1.0, 0.0, 0.0))),
+        transfer_control(DRIVE, Transfer((1.0,), (1.0, 0.0, 4.0))),
+    ):
+        with pytest.raises(InputError, match="control"):
+            sampled_drive(control, period=0.01, limit=1e4)
+    law = sampled_drive(pi_control(DRIVE, 1e3, 1e3), period=0.01, limit=1e4)
+    for bad in ("drive.csv", "9.c", "Enable.st", "LIMIT.xml", "fastestchange.scl"):
+        with pytest.raises(InputError):
+            export_drive(law, tmp_path / bad)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_writes_laws_over_depth_and_at_one(tmp_path, capsys):
+    def call(*arguments):
+        base = ("table", "--rig", "vertical-3000", "--structure", "soft-torque")
+        with pytest.raises(SystemExit) as stop:
+            cli.main([*base, *arguments])
+        return stop.value.code, *capsys.readouterr()
+
+    out = str(tmp_path / "drive.c")
+    given = ("--out", out, "--period", "10 ms", "--limit", "40 kN*m", "--rate-limit", "80 kN*m/s")
+    status, told, _ = call(*given, "--depth", "2500:3000:2 m", "--watchdog", "50")
+    assert status == 0
+    assert "Held to the middle between depths" in told
+    header = (tmp_path / "drive.h").read_text()
+    for words in ("2500 m: Kp", "3000 m: Kp", "at most 800 N m a sample", "50 equal speeds"):
+        assert words in " ".join(header.replace(" *", "").split()), words
+    status, told, _ = call(*given)
+    assert status == 0
+    assert "m: Kp" not in (tmp_path / "drive.h").read_text()
+    for bad, option in (
+        (given[:4], "--limit"), (("--out", out, *given[4:]), "--period"),
+        ((*given, "--real", "float"), "--real"), (("--period", "10 ms"), "--period"),
+        ((*given, "--fmi", "2.0"), "--fmi"), ((*given, "--smooth", "5"), "--smooth"),
+        (("--structure", "z-torque", "--out", out, "--period", "20 ms", *given[4:]), "--period"),
+        (("--out", str(tmp_path / "Enable.st"), *given[2:]), "--out"),
+    ):  # fmt: skip
+        status, told, err = call(*bad)
+        assert (status, told) == (2, ""), bad
+        assert f"drillctrl: {option} = " in err, (bad, err)
