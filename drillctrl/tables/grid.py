@@ -149,7 +149,8 @@ class Grid:
         fitting: tuple[tuple[str, ...], ...] = tuple(
             ("rotary_speed", feed, third) for third in THIRD for feed in FEEDS
         )
-        further = {*self.plant.own, *(() if self.rig is None else CHANGES)}
+        of_pipe = self.rig is not None and isinstance(self.plant.string, PipeString)
+        further = {*self.plant.own, *(CHANGES if of_pipe else ())}
         if self.rig is None:
             fitting = tuple((*DIMENSIONLESS[:2], third) for third in ("psi", *self.plant.own))
             further |= {*FURTHER}

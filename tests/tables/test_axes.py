@@ -19,6 +19,7 @@ from drillctrl import (
     rig_grid,
     save_table,
     scheduled,
+    string_preset,
     table,
     table1,
 )
@@ -139,3 +140,19 @@ def test_the_command_takes_further_axes(tmp_path, capsys):
         status, told, err = call(*bad)
         assert (status, told) == (2, ""), bad
         assert f"drillctrl: {option} = " in err, err
+
+
+def test_rock_depth_and_mud_vary_together():
+    rig = string_preset("paper-string")
+    grid = rig_grid(
+        rig, Axis("rotary_speed", (12.0, 15.0)), penetration_rate=2e-3,
+        rock_strength=linear_axis("rock_strength", 40e6, 60e6, 2),
+        depth=linear_axis("depth", 900.0, 1100.0, 2), mud=linear_axis("mud", 1000.0, 1200.0, 2),
+    )  # fmt: skip
+    assert grid.shape == (2, 1, 2, 2, 2)
+    assert grid.names == ("omega0", "delta0", "psi", "depth", "mud")
+    for place, case in zip(grid.coordinates.tolist(), grid.cases, strict=True):
+        assert case.plant.string.string.length == pytest.approx(place[3])
+        assert case.plant.string.string.mud_density == place[4]
+        np.testing.assert_allclose(grid.place_of(case), grid.groups([place])[0], rtol=1e-12)
+        np.testing.assert_allclose(grid.locate(*grid.place_of(case))[0], place, rtol=1e-9)
