@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from drillctrl.drilling.rig import Rig
+from drillctrl.strings.check import TORSIONAL_BAND, string_modes
 from drillctrl.strings.line import Line, Piece, Stretch
 from drillctrl.strings.rig import StringRig
 
@@ -30,6 +32,8 @@ class Family:
         What is scaled; None of pipe above a disc of which nothing is known.
     lumped : (float, float)
         Stiffness and inertia of the base lumped to one spring and disc.
+    single : bool
+        Whether the base is nothing else.
     """
 
     names: tuple[str, ...]
@@ -38,6 +42,7 @@ class Family:
     high: tuple[float, ...]
     base: Line | None = None
     lumped: tuple[float, float] = (0.0, 0.0)
+    single: bool = False
 
     def line(self, values: Sequence[float]) -> Line:
         """Return the line of some values of the parameters."""
@@ -46,6 +51,17 @@ class Family:
             return pipe_and_disc(stiffness, pipe, disc, damping)
         stiffer, heavier, damping = values
         return scaled(self.base, stiffer, heavier, damping)
+
+    def modes(self, values: Sequence[float]) -> list[tuple[float, float]]:
+        """Return frequencies in Hz and damping ratios, top held and bit free."""
+        if self.single:
+            stiffness, inertia = self.effective(values)
+            rate = math.sqrt(stiffness / inertia)
+            return [(rate / (2.0 * math.pi), values[2] / (2.0 * rate))]
+        return [
+            (mode.frequency, mode.damping_ratio)
+            for mode in string_modes(self.line(values), "torsional", TORSIONAL_BAND)
+        ]
 
     def effective(self, values: Sequence[float]) -> tuple[float, float]:
         """Return stiffness and inertia of one spring and disc instead, N m/rad and kg m²."""
@@ -118,6 +134,7 @@ def family_of(rig: Rig) -> Family:
         (1.6, 1.6, 5.0),
         line,
         (rig.torsional_stiffness, rig.inertia),
+        not isinstance(rig, StringRig),
     )
 
 

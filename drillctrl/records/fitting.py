@@ -29,7 +29,6 @@ from drillctrl.records.peaks import Peak
 from drillctrl.records.record import Record
 from drillctrl.records.surface import Carrier
 from drillctrl.records.swings import period_of
-from drillctrl.strings.check import TORSIONAL_BAND, string_modes
 from drillctrl.strings.line import Line
 
 # Twice the standard error holds the truth in 95 of 100.
@@ -38,8 +37,10 @@ _USED = 0.7
 # Errors that no noise explains: edges of the band, a law that is not quite a bit's.
 _SPEED_UNIT, _TORQUE_UNIT = 0.005, 0.01
 _FIRST_MODES = 3
-# Distances from the law are averaged over so many seconds.
-_TOGETHER = 0.4
+# The error of a logarithm that says that nothing is known.
+_UNKNOWN = 10.0
+# Distances from the law are averaged over so many seconds, of one disc on a spring over fewer.
+_TOGETHER, _TOGETHER_SINGLE = 0.4, 0.1
 # Standard errors of the method itself on recordings of known rigs, beside those of noise: of
 # logarithms, of the lag in s. A sharp corner of the law meets motion whose band ends.
 _METHOD = {"damping": 0.12, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
@@ -173,7 +174,7 @@ def _descended(
         free_lag=lag is None,
         margin=prepared.margin,
         block=max(10, int(20.0 / step)),
-        together=max(1, int(_TOGETHER / step)),
+        together=max(1, int((_TOGETHER_SINGLE if family.single else _TOGETHER) / step)),
         begin=begin,
         rounds=rounds,
     )
@@ -217,6 +218,7 @@ def _told(
 
     def estimate(function: Callable[[FloatArray], float]) -> Estimate:
         value, error = found.told(function)
+        error = min(error, _UNKNOWN)
         return Estimate(value, value * math.exp(-_TWICE * error), value * math.exp(_TWICE * error))
 
     def line(values: FloatArray) -> Line:
@@ -251,7 +253,7 @@ def _told(
         factors=(found.value("stiffness"), found.value("inertia"))
         if family.base is not None
         else None,
-        modes=_modes(found, line),
+        modes=_modes(found, family),
         line=carrier.line,
         drive_inertia=inertia,
         used=(0.0, end),
@@ -295,23 +297,20 @@ def _reasons(
     return tuple(told)
 
 
-def _modes(found: Descent, line: Callable[[FloatArray], Line]) -> tuple[Peak, ...]:
+def _modes(found: Descent, family: Family) -> tuple[Peak, ...]:
     made: dict[bytes, list[tuple[float, float]]] = {}
 
     def modes(values: FloatArray) -> list[tuple[float, float]]:
         key = values.tobytes()
         if key not in made:
-            made[key] = [
-                (mode.frequency, mode.damping_ratio)
-                for mode in string_modes(line(values), "torsional", TORSIONAL_BAND)
-            ]
+            made[key] = family.modes(values[: len(family.names)].tolist())
         return made[key]
 
     peaks = []
     for i in range(min(_FIRST_MODES, len(modes(found.values)))):
         frequency, off = found.told(lambda v, i=i: modes(v)[i][0])  # type: ignore[misc]
         ratio, about = found.told(lambda v, i=i: modes(v)[i][1])  # type: ignore[misc]
-        about = min(about, 1e3)
+        about = min(about, _UNKNOWN)
         peaks.append(Peak(frequency, _TWICE * off * frequency, ratio, _TWICE * about * ratio))
     return tuple(peaks)
 

@@ -33,6 +33,7 @@ from drillctrl.records.swings import (
     quiet,
     sticking_share,
     swing_index,
+    without_noise,
 )
 from drillctrl.strings.rig import StringRig
 
@@ -180,7 +181,7 @@ def study_record(
     if surface and fit and period is None and found is None:
         notes.append("no string was fitted: the bit does not stick and slip")
     severity, swing, sticking, source = _severity(record, bit)
-    modes, modes_from = _modes(record, found, period)
+    modes, modes_from = _modes(record, found, period, sticking)
     drive = None
     if surface:
         drive = _drive(record, rig, found, inertia, lag, prepared)
@@ -215,16 +216,20 @@ def _severity(
     else:
         return None, None, None, None
     severity = swing_index(speed, record.step, least=0.5)
+    if source == "surface" and bit is not None:
+        severity = without_noise(severity, speed, bit.speed_error, bit.band)
     share = sticking_share(speed, error)
     return severity, median(severity.values), finite_or_none(share), source
 
 
 def _modes(
-    record: Record, found: RecordFit | None, period: Period | None
+    record: Record, found: RecordFit | None, period: Period | None, sticking: float | None
 ) -> tuple[tuple[Peak, ...], str | None]:
     if found is not None and found.identifiable:
         return found.modes, "fit"
-    if period is not None or "torque" not in record.values:
+    # Lines of a bit that sticks are no modes.
+    slips = period is not None if sticking is None else sticking > _STICKS
+    if slips or "torque" not in record.values:
         return (), None
     cuts = record.segments("torque", shortest=_MODES_NEED)
     if not cuts:

@@ -173,6 +173,29 @@ def swing_index(
     return Windows(np.array(times), np.array(values))
 
 
+def without_noise(found: Windows, speed: FloatArray, error: float, band: float) -> Windows:
+    """Return indices without what noise adds to largest and smallest.
+
+    As they are where that would be more than half of them: the error is then a bound.
+
+    Parameters
+    ----------
+    found : Windows
+        Of `swing_index`, in its usual windows.
+    speed : array
+        Of which they are.
+    error : float
+        Its standard error.
+    band : float
+        Hz, that of the noise: it has so many independent values in a window.
+    """
+    count = max(2.0, 2.0 * band * WINDOW)
+    mean = float(np.nanmean(speed))
+    added = np.sqrt(2.0 * np.log(count)) * error / mean if mean > 0.0 else 0.0
+    left = np.sqrt(np.maximum(found.values**2 - added**2, 0.0))
+    return found._replace(values=np.where(added < 0.5 * found.values, left, found.values))
+
+
 def window_means(data: FloatArray, step: float, window: float = WINDOW) -> FloatArray:
     """Return the means in the windows of `swing_index`, NaN where part of one is missing."""
     size = min(data.size, max(4, round(window / step)))

@@ -1,6 +1,7 @@
 """What recordings of rigs that another program simulates show, against what that program knows."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,10 +16,11 @@ from drillctrl import (
     load_rig,
     read_record,
     study_record,
+    table1,
 )
 from drillctrl.records.peaks import spectral_modes
 from drillctrl.records.swings import period_of, quiet, sticking_share, swing_index
-from tests.records.other_rig import RPM, OtherRig, recorded, write_csv
+from tests.records.other_rig import RPM, OtherRig, _march, recorded, write_csv
 
 RIG = OtherRig()
 STICKS = {"speed": 80.0, "seconds": 400.0, "rock": 0.02, "steps": (0.1, 10.0)}
@@ -133,6 +135,29 @@ def test_a_string_is_fitted_that_was_taken_wrong(sticking, tmp_path):
     pipe = np.sqrt(79.3e9 * 1.15 * 7850.0 * 0.9) * np.pi / 32.0 * (0.127**4 - 0.1086**4)
     reflected = np.abs((law - pipe) / (law + pipe))
     np.testing.assert_allclose(seen.reflection[clear], reflected[clear], atol=0.05)
+
+
+def test_a_lumped_rig_is_fitted(tmp_path):
+    """One spring and one disc under the same drive, its torque measured in the pipe."""
+    stiffness, inertia, damping, count = 938.0, 116.0, 0.25, 12000
+    random = np.random.default_rng(2)
+    out = _march(
+        np.array([0.0, inertia]), np.array([stiffness]), damping, 0.0, 2900.0, 12000.0, 6000.0,
+        np.array([3000.0, 1500.0, 6.0]), np.full(count, 80.0 * RPM),
+        0.02 * random.standard_normal(count),
+        100 * count, 100, 5e-4, 0.0,
+    )  # fmt: skip
+    top = out[:, 0] / RPM + random.normal(0.0, 0.2, count)
+    torque = out[:, 3] + random.normal(0.0, 60.0, count)
+    wrong = replace(table1(), torsional_stiffness=1.1 * stiffness, inertia=0.9 * inertia)
+    study = study_record(record_of(0.05 * np.arange(count), top, torque), wrong)
+    assert study.fit.stiffness.value == pytest.approx(stiffness, rel=0.03)
+    assert study.fit.inertia.value == pytest.approx(inertia, rel=0.03)
+    (mode,) = study.modes
+    assert mode.frequency == pytest.approx(np.sqrt(stiffness / inertia) / (2 * np.pi), rel=0.02)
+    windows = out[:, 2].reshape(-1, 400)
+    truth = np.median(np.ptp(windows, axis=1) / (2.0 * windows.mean(axis=1)))
+    assert study.swing == pytest.approx(truth, abs=0.05)
 
 
 def test_nothing_needs_to_be_known_of_the_string(sticking):
