@@ -117,7 +117,7 @@ def vibrations(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
         raise InputError("counts", "something else", "two numbers of points")
     across, up = (checked_integer("points", count, 2, _MOST_NODES) for count in counts)
     case, controller = asked.run()
-    tell(0, 0, "starting")
+    tell(0, across * up * (1 if controller is None else 2), "simulating")
     # Processes of their own would take longer to start than a few points.
     with open_executor(_cores() if across * up > _FEW_NODES else 1, None) as executor:
         found = vibration_map(

@@ -115,8 +115,11 @@ def sentence(speed, rop):
 
 
 def until(page, condition):
-    """Wait until a condition holds; the page's policy forbids to evaluate a text in it."""
-    page.wait_for_function(f"() => {condition}")
+    """Ask until a condition holds; the page's policy lets nothing wait inside of it."""
+    ends = time.monotonic() + 60.0
+    while not page.evaluate(f"() => {condition}"):
+        assert time.monotonic() < ends, condition
+        page.wait_for_timeout(50)
 
 
 def shows(page, panel, text):
@@ -136,10 +139,8 @@ def type_in(page, selector, value):
 
 
 def says(page, panel, text):
-    page.wait_for_function(
-        "([id, text]) => document.querySelector(`#panel-${id} .says`).textContent.includes(text)",
-        arg=[panel, text],
-    )
+    """Wait until a panel's sentence has a text."""
+    until(page, f"document.querySelector('#panel-{panel} .says').textContent.includes({text!r})")
 
 
 def test_it_opens_at_the_point_of_the_command_line(page):
