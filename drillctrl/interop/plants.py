@@ -46,7 +46,10 @@ def from_control(
     """
     parts = ("A", "B", "C", "D", "dt", "state_labels", "input_labels", "output_labels")
     if not all(hasattr(plant, name) for name in parts):
-        raise InputError("plant", type(plant).__name__, "a state-space system: control.ss(plant)")
+        ours = "control.ss(plant)"
+        if type(plant).__module__.startswith("scipy."):
+            ours = "s = plant.to_ss(); control.ss(s.A, s.B, s.C, s.D)"
+        raise InputError("plant", type(plant).__name__, f"a state-space system: {ours}")
     if plant.dt:
         raise InputError("plant", f"sampled every {plant.dt}", "in continuous time")
     if np.any(plant.D):

@@ -15,6 +15,7 @@ from drillctrl import (
     as_case,
     chart,
     close_loop,
+    count_right_of,
     design,
     lifted_system,
     loop_transfer,
@@ -212,3 +213,58 @@ def test_what_cannot_have_late_channels_says_so(many):
         DelaySystem([[0.0]], feedback_delay=-1.0)
     with pytest.raises(InputError, match="no delay is known"):
         design(DelaySystem([[0.0]], B=[[1.0]]), feedback(1, 1))
+
+
+@pytest.fixture(scope="module")
+def exchanger():
+    """A heated body, a cooler and two long pipes, with the sum of the error.
+
+    After Vyhlídal, Zítek and Paulů, whose set-up has this structure: delays in the states up to
+    40 s, and one of 13.2 s at the input.
+    """
+    terms = {tau: np.zeros((5, 5)) for tau in (0.0, 2.8, 6.5, 9.2, 13.0, 18.0, 40.0)}
+    terms[0.0][1:3, :3] = [[1.0 / 3.0, -2.0 / 3.0, 0.0], [0.0, 0.0, -1.0 / 3.0]]
+    terms[0.0][4, 3] = -1.0
+    terms[2.8][3, 2] = 0.81 / 25.0
+    terms[6.5][0, 0] = -1.0 / 14.0
+    terms[9.2][3, 3] = -1.0 / 25.0
+    terms[13.0][1, 3] = 1.0 / 3.0
+    terms[18.0][2, 1] = 0.94 / 3.0
+    terms[40.0][0, 1] = 0.24 / 14.0
+    late = {tau: matrix for tau, matrix in terms.items() if tau}
+    drive = np.array([[0.39 / 14.0], [0.0], [0.0], [0.0], [0.0]])
+    plant = DelaySystem(
+        terms[0.0], tuple(late.values()), tuple(late), drive, np.eye(5), input_delays=(13.2,)
+    )
+    return plant, terms, drive
+
+
+def test_a_late_input_before_six_other_delays(exchanger):
+    plant, terms, drive = exchanger
+    structure = feedback(1, 5, late=0.0)
+    gains = np.array([[-0.49141, -2.13058, -4.15442, -5.0, 0.20639]])
+    closed = close_loop(plant, structure, gains)
+    alpha = spectral_abscissa(closed)
+    assert alpha == pytest.approx(-0.0544, abs=1e-3)
+    assert count_right_of(closed, alpha + 1e-6).count == 0
+    assert count_right_of(closed, alpha - 1e-4).count > 0
+    s = 0.05j
+    delta = s * np.eye(5) - sum(matrix * np.exp(-s * tau) for tau, matrix in terms.items())
+    expected = np.linalg.solve(delta, drive) * np.exp(-13.2 * s)
+    response = frequency_response(plant, [0.05])
+    assert response[..., 0] == pytest.approx(expected, rel=1e-12)
+    loop = loop_transfer(plant, structure, gains, None, np.array([0.05]))
+    assert loop[0, 0, 0] == pytest.approx(-(gains @ expected)[0, 0], rel=1e-12)
+
+
+def test_a_gain_behind_a_late_input_is_designed_for(exchanger):
+    """One gain: the best of a thousand, each judged by its roots, is no better."""
+    plant, *_ = exchanger
+    low, none = np.array([[0.0, 0.0, 0.0, 0.0, 0.0]]), np.zeros((1, 5))
+    high = np.array([[0.0, 0.0, 0.0, 0.0, 1.0]])
+    structure = FeedbackStructure("sum", plant.output_names, low, high, none, none, ("u1",))
+    found = design(plant, structure, trials=False)
+    family = loop_family(plant, structure)
+    assert found.spectral_abscissa < 0.0
+    sampled = family.abscissas(np.linspace(0.0, 1.0, 401)[:, None]).min()
+    assert found.spectral_abscissa < sampled + 1e-9

@@ -176,6 +176,16 @@ def test_a_delay_system_keeps_its_names():
 def test_systems_of_other_packages_are_told_what_to_become():
     import scipy.signal
 
-    for plant in (scipy.signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), 3.0):
-        with pytest.raises(InputError, match=r"control\.ss\(plant\)"):
+    with pytest.raises(InputError, match=r"control\.ss\(plant\)"):
+        from_control(3.0, 1.0)
+    for plant in (
+        scipy.signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]),
+        scipy.signal.TransferFunction([1.0], [1.0, 1.0]),
+    ):
+        with pytest.raises(
+            InputError, match=r"s = plant\.to_ss\(\); control\.ss\(s\.A, s\.B, s\.C, s\.D\)"
+        ):
             from_control(plant, 1.0)
+        # What is told does it.
+        s = plant.to_ss()
+        assert from_control(control.ss(s.A, s.B, s.C, s.D), 1.0).A0.tolist() == [[-1.0]]
