@@ -1,24 +1,31 @@
 """Reduced and exact strings against each other at random, and what designed drives stand.
 
 ``python -m benchmarks.strings [COUNT]`` counts growing roots of COUNT random strings, drives and
-points on both routes, compares the roots, and measures a fixed-order law on strings of 2500 m.
+points on both routes, compares the roots, measures a fixed-order law on strings of 2500 m, and
+slows a bit down under four laws until it sticks.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
 from drillctrl import (
+    DriveMachine,
+    RigPoint,
     characteristic_roots,
     count_growing,
     count_right_of,
+    drive_control,
     dynamic_drive_control,
     exact_loop,
     mode_slopes,
     rule_control,
+    slow_down,
+    string_preset,
     weakest_slope,
 )
 from tests.strings.test_counts import random_case
@@ -67,6 +74,25 @@ def fixed_order() -> None:
         )
 
 
+def stick_slip() -> None:
+    """Say at what speed stick-slip begins on `vertical-3000`, slowing down by steps of 5 rpm."""
+    machine = DriveMachine(2900.0, torque_limit=60e3, delay=0.02)
+    rig = replace(string_preset("vertical-3000").with_rock_strength(1e6), drive=machine)
+    where = RigPoint(rig, 10.0, 1e-4 / 3600.0)
+    rpm = np.pi / 30.0
+    for name in ("stiff", "soft-torque", "z-torque", "dynamic-2"):
+        began = time.perf_counter()
+        control = drive_control(name, rig)
+        run = slow_down(where, control, (np.arange(95.0, 15.0, -5.0) * rpm).tolist(), hold=40.0)
+        swing = run.swings[-1] if run.swings.size else float("nan")
+        print(
+            f"{name}: stick-slip from {run.stick_slip / rpm:.0f} rpm, linear {run.linear / rpm:.0f}"
+            f" rpm; swing {swing:.2f} at {run.speeds[-1] / rpm:.0f} rpm, "
+            f"{time.perf_counter() - began:.0f} s"
+        )
+
+
 if __name__ == "__main__":
     fixed_order()
+    stick_slip()
     counts(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
