@@ -13,7 +13,8 @@ import sys
 import numpy as np
 
 from drillctrl import Controller, Drilling, RigPoint, as_case, preset_structure, simulate, table1
-from drillctrl.designs.drilling import controlled_swings, measured_swings
+from drillctrl.designs.controlled_swings import controlled_swings
+from drillctrl.designs.swings import measured_swings
 
 _WINDOW = 4.0
 # The swing is fitted while it is above this many times its smallest, which is the ripple.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -63,6 +64,23 @@ def sources() -> Iterator[tuple[str, list[tuple[str, str]]]]:
         yield f"{name} --help", [("sh", command) for command in examples]
 
 
+def look_at_page(job: list[str], folder: str) -> subprocess.CompletedProcess[str]:
+    """Start what goes on until it is interrupted, read the page's address, and interrupt it."""
+    with subprocess.Popen(
+        ["bash", "-c", f"exec {job[2]}"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as running:
+        assert running.stdout is not None
+        address = running.stdout.readline()
+        running.send_signal(signal.SIGINT)
+        _, errors = running.communicate(timeout=60)
+    status = running.returncode if address.startswith("http://127.0.0.1:") else 1
+    return subprocess.CompletedProcess(job, status, address, errors)
+
+
 def main() -> int:
     """Run everything, each place in an empty folder; return how many failed."""
     failed = 0
@@ -80,7 +98,12 @@ def main() -> int:
                 else:
                     name, job = "the Python blocks", [sys.executable, "-c", content]
                 began = time.perf_counter()
-                done = subprocess.run(job, cwd=folder, capture_output=True, text=True, check=False)
+                if name.startswith("drillctrl explore"):
+                    done = look_at_page(job, folder)
+                else:
+                    done = subprocess.run(
+                        job, cwd=folder, capture_output=True, text=True, check=False
+                    )
                 took = time.perf_counter() - began
                 word = "ok" if done.returncode == 0 else f"FAILED ({done.returncode})"
                 print(f"{place}: {name}: {word}, {took:.1f} s", flush=True)

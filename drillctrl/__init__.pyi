@@ -53,6 +53,7 @@ from .drilling.coefficients import Coefficients as Coefficients
 from .drilling.drive import TopDrive as TopDrive
 from .drilling.friction import FreeBit as FreeBit
 from .drilling.friction import Stribeck as Stribeck
+from .drilling.hoist import Hoist as Hoist
 from .drilling.plant import Plant as Plant
 from .drilling.plant import paper_plant as paper_plant
 from .drilling.plant import top_drive_plant as top_drive_plant
@@ -60,7 +61,6 @@ from .drilling.plausibility import plausibility_notes as plausibility_notes
 from .drilling.point import OperatingPoint as OperatingPoint
 from .drilling.point import RigPoint as RigPoint
 from .drilling.rig import Rig as Rig
-from .drilling.rig import save_rig as save_rig
 from .drilling.rig import table1 as table1
 from .drilling.sensors import Filtered as Filtered
 from .drilling.sensors import Lagging as Lagging
@@ -74,6 +74,13 @@ from .drilling.string import spring_string as spring_string
 from .drilling.structures import feed as feed
 from .drilling.structures import preset_structure as preset_structure
 from .drilling.structures import soft_torque as soft_torque
+from .hardware.bench import bench as bench
+from .hardware.bench import replay as replay
+from .hardware.client import answer_bench as answer_bench
+from .hardware.recording import Recording as Recording
+from .hardware.recording import load_recording as load_recording
+from .hardware.result import BenchRun as BenchRun
+from .hardware.wire import Sample as Sample
 from .interop.controllers import controller_system as controller_system
 from .interop.controllers import scheduled_controller as scheduled_controller
 from .interop.lifted import lifted_system as lifted_system
@@ -103,6 +110,18 @@ from .motion.torsion import TorsionalMode as TorsionalMode
 from .motion.torsion import torsional_modes as torsional_modes
 from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
+from .records.downhole import Downhole as Downhole
+from .records.downhole import bit_from_surface as bit_from_surface
+from .records.example import example_path as example_path
+from .records.fitted_rig import fitted_rig as fitted_rig
+from .records.fitted_rig import save_fit as save_fit
+from .records.fitting import Estimate as Estimate
+from .records.fitting import RecordFit as RecordFit
+from .records.fitting import fit_record as fit_record
+from .records.record import Record as Record
+from .records.record import read_record as read_record
+from .records.study import RecordStudy as RecordStudy
+from .records.study import study_record as study_record
 from .robustness.margins import delay_margin as delay_margin
 from .robustness.margins import parameter_margin as parameter_margin
 from .robustness.norm import PeakGain as PeakGain
@@ -130,6 +149,7 @@ from .simulation.slowing import slow_down as slow_down
 from .simulation.starts import StartRun as StartRun
 from .simulation.starts import StartSet as StartSet
 from .simulation.starts import simulate_starts as simulate_starts
+from .simulation.stepping import SteppedRun as SteppedRun
 from .spectrum.count import count_right_of as count_right_of
 from .spectrum.multiplicity import Root as Root
 from .spectrum.proof import prove_count as prove_count
@@ -178,8 +198,10 @@ from .strings.named_roots import NamedRoots as NamedRoots
 from .strings.named_roots import named_roots as named_roots
 from .strings.presets import string_preset as string_preset
 from .strings.rig import StringRig as StringRig
+from .strings.rig import WeightControl as WeightControl
 from .strings.rig import lump as lump
 from .strings.rig import string_rig as string_rig
+from .strings.saving import save_rig as save_rig
 from .strings.section import Material as Material
 from .strings.section import Section as Section
 from .strings.section import ToolJoint as ToolJoint

@@ -72,8 +72,11 @@ BASES = {
     ("bit",): RIG,
     ("compare",): ("--structures", "p", "--no-charts", "--trials", "none"),
     ("map",): ("--starts", "kick"),
+    ("record",): ("example",),
     ("report",): (*RIG, "--out", "report.html"),
     ("reproduce",): ("fig8",),
+    ("explore",): ("--no-browser",),
+    ("bench",): ("--duration", "0.1", "--wait", "0.05 s", "--port", "0"),
 }
 # What takes seconds of work once all is read is not done.
 WORK = (
@@ -83,6 +86,8 @@ WORK = (
     "studies.vibration.vibration_map",
     "studies.rig_report.rig_report",
     "paper.reproduce.reproduce",
+    "records.study.study_record",
+    "explorer.server.serve",
 )
 
 
@@ -102,7 +107,8 @@ def commands(draw):
     """A verb with one or two of its options, and something after each."""
     path = draw(st.sampled_from(sorted(BASES)))
     base = [*BASES[path]]
-    if path in (("analyze",), ("design",), ("simulate",), ("compare",)) and draw(st.booleans()):
+    with_rig = ("analyze", "design", "simulate", "compare", "bench")
+    if path[0] in with_rig and draw(st.booleans()):
         base = [*(("--duration", "0.5 s") if path == ("simulate",) else base), *RIG]
     added = []
     for _ in range(draw(st.integers(1, 2))):

@@ -10,7 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = (
     *("base", "delay", "spectrum", "robustness", "synthesis", "drilling", "strings", "simulation"),
-    *("motion", "designs", "charts", "tables", "studies", "paper", "interop", "cli"),
+    *("motion", "designs", "charts", "tables", "hardware", "studies", "records", "paper"),
+    *("interop", "explorer", "cli"),
 )
 LOOPS = ("delay", "spectrum", "robustness", "synthesis")
 RESULTS = (
@@ -30,6 +31,9 @@ RESULTS = (
         "studies.comparison",
         "studies.vibration",
         "studies.vibration_values",
+        "records.study",
+        "records.findings",
+        "records.fitting",
     ),
 )
 

@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import re
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from drillctrl import (
     as_case,
     campaign,
     chart,
+    close_loop,
     compare,
     design,
     dimensionless_grid,
@@ -77,33 +79,36 @@ def test_every_verb_takes_it_or_says_why_not(verb, kind):
         assert ask(PLACES[kind]) is not None
 
 
-def _first_argument(name):
-    value = getattr(drillctrl, name)
-    first = next(iter(inspect.signature(value).parameters.values()), None)
-    return None if first is None else str(first.annotation)
-
-
 FUNCTIONS = [name for name in dir(drillctrl) if inspect.isfunction(getattr(drillctrl, name))]
-ONE_KIND = {
-    "DelaySystem": [name for name in FUNCTIONS if _first_argument(name) == "DelaySystem"],
-    "RigPoint": [name for name in FUNCTIONS if _first_argument(name) == "RigPoint"],
-    "Grid": [name for name in FUNCTIONS if _first_argument(name) == "Grid"],
-}
+CLASSES = "|".join(name for name in dir(drillctrl) if inspect.isclass(getattr(drillctrl, name)))
 
 
-@pytest.mark.parametrize("kind", ONE_KIND)
-def test_what_works_on_one_kind_alone_says_so(kind):
-    """Whatever else it takes: the first argument is looked at before anything."""
-    assert ONE_KIND[kind]
-    for name in ONE_KIND[kind]:
-        function = getattr(drillctrl, name)
-        for where in (POINT, PLACES["case"], None, 3.0):
-            least = [
-                parameter
-                for parameter in inspect.signature(function).parameters.values()
-                if parameter.default is parameter.empty
-                and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
-            ]
-            with pytest.raises(InputError, match=f"must be a {kind}") as caught:
-                function(where, *[None] * (len(least) - 1))
+def _asking_for_ours(name):
+    """Return the parameters of a public function that are annotated with one of our classes."""
+    parameters = inspect.signature(getattr(drillctrl, name)).parameters.values()
+    own = re.compile(rf"\b({CLASSES}|Where|Line|Mapping)\b")
+    return [
+        parameter
+        for parameter in parameters
+        if own.search(str(parameter.annotation))
+        and parameter.kind != parameter.VAR_KEYWORD
+        # Beside a number, what is given is read as one.
+        and "float" not in str(parameter.annotation)
+    ]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_an_argument_of_another_kind_is_refused_before_anything(name):
+    for parameter in _asking_for_ours(name):
+        for wrong in (object(), 3.5, *([] if "None" in parameter.annotation else [None])):
+            with pytest.raises(InputError, match=rf"^{parameter.name} = .*: must be ") as caught:
+                getattr(drillctrl, name)(**{parameter.name: wrong})
             assert "\n" not in str(caught.value)
+
+
+def test_a_message_says_where_the_right_kind_comes_from():
+    with pytest.raises(InputError) as caught:
+        close_loop(plant_system(POINT), "case1", [-5.0], [5.0])
+    assert str(caught.value) == (
+        "feedback = 'case1': must be a FeedbackStructure, such as preset_structure('case1')"
+    )

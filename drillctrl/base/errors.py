@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import numbers
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -128,34 +127,3 @@ def checked_integer(parameter: str, value: object, low: int, high: int) -> int:
     if not math.isfinite(number) or number != int(number) or not low <= number <= high:
         raise InputError(parameter, value, permitted)
     return int(number)
-
-
-def takes(kind: type, wanted: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that refuses a first argument of another kind.
-
-    Parameters
-    ----------
-    kind : type
-        What the function works on.
-    wanted : str
-        Says that as the end of "must be ...".
-
-    Raises
-    ------
-    InputError
-        From the decorated function, if its first argument is something else.
-    """
-
-    def decorated(function: Callable[P, R]) -> Callable[P, R]:
-        name = function.__code__.co_varnames[0]
-
-        @functools.wraps(function)
-        def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-            given = args[0] if args else kwargs.get(name)
-            if not isinstance(given, kind):
-                raise InputError(name, type(given).__name__, wanted)
-            return function(*args, **kwargs)
-
-        return checked
-
-    return decorated

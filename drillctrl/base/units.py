@@ -7,7 +7,9 @@ pint is loaded at the first use, because most calls are dimensionless.
 from __future__ import annotations
 
 import functools
+import math
 import re
+import tokenize
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,9 @@ from drillctrl.base.errors import InputError, checked_number
 
 if TYPE_CHECKING:
     import pint
+
+# What pint lets through of those that its parser meets.
+_REFUSED = (AssertionError, AttributeError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,7 @@ NUMBER = Dimension("a plain number", "", "'0.6'")
 DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
 LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")
 RATE = Dimension("a rate", "1/s", "'0.1 1/s'")
+FEED_GAIN = Dimension("a feed per force", "m/s/N", "'0.2 m/h/kN'")
 TIME = Dimension("a time", "s", "'0.35 s' or '20 ms'")
 
 # The field's spellings that pint lacks or reads as something else (kNm: nautical miles).
@@ -79,6 +85,25 @@ _DEFINITIONS = (
     "fph = foot / hour",
     "fpm = foot / minute",
 )
+# The units that are typed most, in the dimension's own: pint takes a second to load.
+_TYPED_MOST = {
+    NUMBER: {"": 1.0},
+    ROTARY_SPEED: {"rad/s": 1.0, "rpm": math.pi / 30.0},
+    SPEED: {"m/s": 1.0, "m/h": 1.0 / 3600.0, "ft/h": 0.3048 / 3600.0},
+    FORCE: {"N": 1.0, "kN": 1e3, "klbf": 4448.2216152605},
+    TORQUE: {"N*m": 1.0, "kN*m": 1e3},
+    STRESS: {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9},
+    LENGTH: {"m": 1.0, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
+    MASS: {"kg": 1.0},
+    INERTIA: {"kg*m**2": 1.0, "kg*m^2": 1.0},
+    STIFFNESS: {"N/m": 1.0, "kN/m": 1e3},
+    TORSIONAL_STIFFNESS: {"N*m/rad": 1.0},
+    TORSIONAL_DAMPING: {"N*m*s/rad": 1.0},
+    DENSITY: {"kg/m**3": 1.0, "kg/m^3": 1.0, "ppg": 0.45359237 / 0.003785411784},
+    LINEAR_DENSITY: {"kg/m": 1.0, "lb/ft": 0.45359237 / 0.3048},
+    RATE: {"1/s": 1.0},
+    TIME: {"s": 1.0, "ms": 1e-3},
+}
 # What is a weight on every rig floor and a mass in pint.
 _AS_FORCE = {
     "t": "metric_ton_force",
@@ -151,6 +176,9 @@ def to_si(parameter: str, value: object, dimension: Dimension) -> float:
     if not isinstance(value, str):
         raise InputError(parameter, value, f"{permitted} (a text with its unit)")
     number, written = _split(value, dimension)
+    known = _TYPED_MOST.get(dimension, {}).get(written.strip()) if number else None
+    if known is not None:
+        return checked_number(parameter, float(number) * known)
     for word in re.findall(r"[A-Za-z_]+", written):
         if word in _TWO_READINGS:
             raise InputError(parameter, repr(value), f"one of two things: {_TWO_READINGS[word]}")
@@ -161,7 +189,7 @@ def to_si(parameter: str, value: object, dimension: Dimension) -> float:
         try:
             si = _converted(float(number), unit, dimension)
             break
-        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+        except (pint.PintError, tokenize.TokenError, *_REFUSED):
             continue
     if si is None:
         raise InputError(parameter, repr(value), permitted)
@@ -209,6 +237,21 @@ def _split(text: str, dimension: Dimension) -> tuple[str, str]:
         text = f"{int(fraction['whole'] or 0) + part!r}{text[fraction.end() :]}"
     match = re.fullmatch(rf"({_NUMBER})\s*({_UNIT})", text)
     return (match[1], match[2]) if match else ("", "")
+
+
+def known_unit(text: str) -> bool:
+    """Return whether a text is a unit of something, as rigs and pint spell it."""
+    import pint
+
+    if not text or len(text) > 40 or not re.fullmatch(_UNIT, text):
+        return False
+    for unit in (*_readings(text, NUMBER), *_readings(text, ROTARY_SPEED)):
+        try:
+            _registry().Quantity(1.0, unit)
+        except (pint.PintError, AssertionError, AttributeError, TypeError, ValueError):
+            continue
+        return True
+    return text in _TWO_READINGS
 
 
 def from_si(value: float, dimension: Dimension, unit: str) -> float:

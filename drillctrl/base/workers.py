@@ -79,7 +79,7 @@ def open_executor(workers: int, scheduler: str | None) -> Iterator[Executor | No
 @contextlib.contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
     # A forked child would inherit the threads of the linear algebra.
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _follow_parent)
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), follow_parent)
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         # Each task that finds none idle starts a process, which inherits that an interrupt is
@@ -102,7 +102,7 @@ def _processes(workers: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _follow_parent() -> None:
+def follow_parent() -> None:
     """Let a process end when the one that started it has ended, however it did."""
     parent = multiprocessing.parent_process()
     assert parent is not None

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.errors import checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
 from drillctrl.charts.regions import Region, label_regions
@@ -149,6 +150,7 @@ class StabilityChart:
         )
 
 
+@checks_kinds
 def chart(
     point: Where,
     x: AxisLike = ("omega0", 0.5, 25.0),

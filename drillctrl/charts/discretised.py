@@ -16,6 +16,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.figure import GREY, ORANGE, axis_name, new_axes
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.charts.figure import axis_text, draw_curves
@@ -94,6 +95,7 @@ class GainSurface:
         return ax
 
 
+@checks_kinds
 def gain_surface(
     point: Where,
     structure: str | FeedbackStructure = "case1",
@@ -183,6 +185,7 @@ class RootLocus:
         return ax
 
 
+@checks_kinds
 def root_locus(
     point: Where,
     axis: AxisLike = ("omega0", 3.0, 24.0),

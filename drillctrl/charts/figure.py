@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, headline, new_axes
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
 from drillctrl.charts.plane import held_text
@@ -14,8 +16,6 @@ from drillctrl.drilling.gain_units import control_text
 from drillctrl.drilling.quantities import root_scales, told_scale
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from matplotlib.axes import Axes
 
     from drillctrl.base.arrays import FloatArray
@@ -259,6 +259,7 @@ def _label_regions(ax: Axes, plane: Plane, regions: Sequence[Region]) -> None:
             )
 
 
+@checks_kinds
 def plot_charts(charts: Mapping[str, Charted], ax: Axes | None = None) -> Axes:
     """Compare charts over the same axes: structures, rocks, dampings or decay rates.
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
@@ -187,6 +188,7 @@ class StabilisableChart:
         )
 
 
+@checks_kinds
 def stabilisable_chart(
     point: Where,
     x: AxisLike = ("omega0", 0.5, 25.0),

@@ -98,8 +98,8 @@ def si_loads(
 
 def _scales(string: StringAtBit) -> tuple[FloatArray, float]:
     """Return the SI values of loads per state, (2, 4), and of a unit of time, s."""
-    axial = lumped(string.string, string.string.tension)
-    torsional = lumped(string.string, string.string.torsion)
+    unit = string.units or string.string
+    axial, torsional = lumped(unit, unit.tension), lumped(unit, unit.torsion)
     time = math.sqrt(torsional.mass / torsional.stiffness)
     efforts = np.array([axial.mass / time**2, torsional.stiffness])
     return np.outer(efforts, [1.0, time, 1.0, time]), time

@@ -15,6 +15,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.extras import required
 from drillctrl.base.files import replacing
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.axes import Axis, make_axis
 from drillctrl.charts.chains import stable_curves
 from drillctrl.charts.chart import StabilityChart, chart
@@ -211,6 +212,7 @@ def _area(lines: Sequence[ScanLine], stride: int) -> float:
     return float(np.trapezoid(lengths, [line.position for line in chosen]))
 
 
+@checks_kinds
 def stability_volume(
     point: Where,
     x: AxisLike = ("omega0", 0.5, 24.0),

@@ -12,11 +12,14 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.analyze import analyze_command
+from drillctrl.cli.bench import bench_command
 from drillctrl.cli.bit import bit_command
 from drillctrl.cli.chart import chart_command
 from drillctrl.cli.compare import compare_command
 from drillctrl.cli.design import design_command
+from drillctrl.cli.explore import explore_command
 from drillctrl.cli.map import map_command
+from drillctrl.cli.record import record_command
 from drillctrl.cli.report import report_command
 from drillctrl.cli.reproduce import reproduce_command
 from drillctrl.cli.rig import rig_command
@@ -45,9 +48,12 @@ for _command in (
     simulate_command,
     bit_command,
     table_command,
+    record_command,
+    bench_command,
     report_command,
     reproduce_command,
     rig_command,
+    explore_command,
 ):
     cli.add_command(_command)
 

@@ -45,9 +45,8 @@ from drillctrl.cli.verb import Verb
 @click.option(
     "--most-periods",
     type=int,
-    default=400,
-    show_default=True,
-    help="Periods of each start that are looked at where the orbit is irregular.",
+    help="Periods of each start that are looked at where the orbit is irregular "
+    "(400; with --along 40).",
 )
 @click.option(
     "--imposed",
@@ -69,7 +68,7 @@ def bit_command(
     frequencies: tuple[str, ...],
     amplitude: tuple[float, ...],
     modes: int,
-    most_periods: int,
+    most_periods: int | None,
     imposed: bool,
     band: bool,
     along: str | None,
@@ -107,13 +106,16 @@ def bit_command(
         raise InputError("--frequency", frequencies[0], "left out with --band and --along")
     if band and along is not None:
         raise InputError("--along", along, "left out with --band")
+    # What is left to the function that looks has a default of its own there.
+    patience: dict[str, Any] = {} if most_periods is None else {"most_periods": most_periods}
     if along is not None:
         if imposed:
             raise InputError("--imposed", "given", "left out with --along")
-        _along(where, along, wanted, modes, workers, rig_name(point), as_json, out, plot)
+        _along(where, along, wanted, modes, workers, patience, rig_name(point), as_json, out, plot)
         return
     if band:
-        _band(where, wanted, workers, most_periods, imposed, as_json, out, plot)
+        patience = {"most_periods": 400, **patience}
+        _band(where, wanted, workers, patience, imposed, as_json, out, plot)
         return
     from drillctrl.motion.report import motion_fields, motion_summary, responses_summary
     from drillctrl.motion.swing import AMPLITUDES, drilling_motion
@@ -124,17 +126,15 @@ def bit_command(
         AMPLITUDES if wanted is None else wanted,
         modes=modes,
         workers=workers,
-        most_periods=most_periods,
         ripple=not imposed,
+        **patience,
     )
     text, responses = functools.partial(motion_summary, found), None
     if asked:
         from drillctrl.motion.response import bit_response
 
         responses = [
-            bit_response(where, omega, a, most_periods=most_periods)
-            for omega in asked
-            for a in wanted or ()
+            bit_response(where, omega, a, **patience) for omega in asked for a in wanted or ()
         ]
         text = functools.partial(responses_summary, found, responses)
     draw = functools.partial(found.plot, name=rig_name(point))
@@ -146,7 +146,7 @@ def _band(
     where: Any,
     amplitudes: list[float] | None,
     workers: int,
-    most_periods: int,
+    patience: dict[str, Any],
     imposed: bool,
     as_json: bool,
     out: str | None,
@@ -154,12 +154,10 @@ def _band(
 ) -> None:
     """Tell the response over a band of frequencies."""
     from drillctrl.motion.band import bit_band
-    from drillctrl.motion.report import band_fields, band_summary
+    from drillctrl.motion.band_report import band_fields, band_summary
 
     amplitude = 0.1 if not amplitudes else amplitudes[0]
-    found = bit_band(
-        where, amplitude, workers=workers, most_periods=most_periods, ripple=not imposed
-    )
+    found = bit_band(where, amplitude, workers=workers, ripple=not imposed, **patience)
     fields = {"schema": "drillctrl/bit-band/1", **band_fields(found)}
     text = functools.partial(band_summary, found)
     deliver(fields, text, found.plot, as_json=as_json, out=out, plot=plot)
@@ -171,17 +169,20 @@ def _along(
     amplitudes: list[float] | None,
     mode: int,
     workers: int,
+    patience: dict[str, Any],
     name: str | None,
     as_json: bool,
     out: str | None,
     plot: str | None,
 ) -> None:
     """Tell the damping left over speed or rate."""
-    from drillctrl.motion.report import along_fields, along_summary
+    from drillctrl.motion.along_report import along_fields, along_summary
     from drillctrl.motion.threshold import torsional_threshold
 
     amplitude = 0.03 if not amplitudes else amplitudes[0]
-    found = torsional_threshold(where, along, amplitude=amplitude, mode=mode, workers=workers)
+    found = torsional_threshold(
+        where, along, amplitude=amplitude, mode=mode, workers=workers, **patience
+    )
     fields = {"schema": "drillctrl/bit-along/1", **along_fields(found)}
     text = functools.partial(along_summary, found)
     draw = functools.partial(found.plot, name=name)

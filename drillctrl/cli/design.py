@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 
-from drillctrl.base.errors import InputError
 from drillctrl.cli.drives import are_drives, deliver_drive_design
 from drillctrl.cli.gains import read_bounds, scales_at
 from drillctrl.cli.objective import (
@@ -43,11 +42,6 @@ from drillctrl.cli.verb import Verb
     multiple=True,
     metavar="GAIN=LOW:HIGH",
     help="For K1, K2 or one gain such as K1_2; with a rig 'K1=-3:3 kN*m/rad'; repeatable.",
-)
-@click.option(
-    "--depth-error",
-    type=float,
-    help="Of dynamic-1 … dynamic-4: the worst of strings shorter and longer by this share (0.2).",
 )
 @objective_options
 @requirement_options
@@ -93,8 +87,6 @@ def design_command(
         if require_stable and not stable:
             raise click.exceptions.Exit(NOT_STABILISED)
         return
-    if options.pop("depth_error") is not None:
-        raise InputError("--depth-error", "given", "left out unless a dynamic law is designed")
     objective, requirements = read_objective(options), read_requirements(options)
     surroundings = {name: options.pop(name) for name in SURROUNDINGS}
     where = read_point(options)

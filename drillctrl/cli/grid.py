@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 _GROUPS = ("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades")
-_RIG = ("rig", "speed", "rop", "wob", "rock_strength")
+_RIG = ("rig", "speed", "rop", "wob", "rock_strength", "depth", "mud")
 _SPAN = "LOW:HIGH:COUNT"
 
 
@@ -37,7 +37,10 @@ def grid_options(command: Command) -> Command:
         click.option("--rop", metavar=with_unit, help="Such as '5:30:6 m/h'."),
         click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
         click.option("--rock-strength", metavar=with_unit, help="Such as '40:80:5 MPa'."),
-        click.option("--depth", metavar=with_unit, help="Of laws of a top drive: '1500:4500:7 m'."),
+        click.option(
+            "--depth", metavar=with_unit, help="Length of a real string: '1500:4500:7 m'."
+        ),
+        click.option("--mud", metavar=with_unit, help="Its mud, such as '9:13:3 ppg'."),
     ]
     return with_options(command, options)
 
@@ -53,9 +56,9 @@ def read_grid(options: dict[str, Any]) -> Grid:
     from drillctrl.tables.grid import dimensionless_grid
 
     given = {name: value for name, value in options.items() if value is not None}
-    if "depth" in given:
-        wanted = "left out, or given with a --structure of a top drive such as soft-torque"
-        raise InputError("--depth", given["depth"], wanted)
+    for name in ("depth", "mud"):
+        if name in given and "rig" not in given:
+            raise InputError(f"--{name}", given[name], "left out without the --rig of a string")
     groups = {k: given[k] for k in _GROUPS if k in given}
     rig = {k: given[k] for k in _RIG if k in given}
     if groups and rig:
@@ -91,6 +94,8 @@ def _rig_grid(given: dict[str, str]) -> Grid:
         "rop": ("penetration_rate", units.SPEED),
         "wob": ("weight_on_bit", units.FORCE),
         "rock_strength": ("rock_strength", units.STRESS),
+        "depth": ("depth", units.LENGTH),
+        "mud": ("mud", units.DENSITY),
     }
     axes: dict[str, Any] = {
         name: _axis(option, given[option], dimension, name)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 # Options that belong to one objective, and the parameter of it that they set.
-_ERRORS = {"psi_error": "psi", "delta0_error": "delta0", "omega0_error": "omega0"}
+_ERRORS = {f"{name}_error": name for name in ("psi", "delta0", "omega0", "depth", "mud")}
 _BELONGS = {
     "semidiscrete": {"m": "m", "order": "order"},
     "worst-case": _ERRORS,
@@ -46,6 +46,14 @@ def objective_options(command: Command) -> Command:
         ),
         click.option("--delta0-error", type=float, help="Relative (worst-case, drilling; 0)."),
         click.option("--omega0-error", type=float, help="Relative (worst-case, drilling; 0)."),
+        click.option(
+            "--depth-error",
+            type=float,
+            help="Relative, of the string's length (worst-case, drilling: 0; dynamic-1 …: 0.2).",
+        ),
+        click.option(
+            "--mud-error", type=float, help="Relative, of its density (worst-case, drilling; 0)."
+        ),
         click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
         click.option("--kick", type=float, help="Largest swing of the speed (drilling; 0.45)."),
         click.option("--modes", type=int, help="Torsional modes (drilling; default 1)."),
@@ -76,6 +84,22 @@ def read_requirements(options: dict[str, Any]) -> Requirements:
     )
 
 
+def _of_fit(rig: str | None) -> dict[str, float]:
+    """Return the errors that a rig fitted to a recording has; none of any other."""
+    if rig is None:
+        return {}
+    from drillctrl.designs.worst_case import fitted_box
+    from drillctrl.strings.files import fitted_errors
+
+    errors = fitted_errors(rig)
+    if not errors:
+        return {}
+    sizes = fitted_box(errors)
+    told = ", ".join(f"{name} by {100.0 * size:.1f} %" for name, size in sizes.items())
+    click.echo(f"drillctrl: note: the box is that of the fitted rig: {told}", err=True)
+    return {option: sizes[name] for option, name in _ERRORS.items()}
+
+
 def read_objective(options: dict[str, Any]) -> Objective | None:
     """Take the options of `objective_options` out of a mapping; None where none was chosen.
 
@@ -96,6 +120,8 @@ def read_objective(options: dict[str, Any]) -> Objective | None:
         "robust": Robust,
     }
     name = options.pop("objective")
+    if name == "worst-case" and all(options[option] is None for option in _ERRORS):
+        options.update(_of_fit(options.get("rig")))
     if name is not None and name not in kinds:
         raise InputError("--objective", name, f"one of {', '.join(kinds)}")
     known = {option for names in _BELONGS.values() for option in names}

@@ -57,9 +57,14 @@ def check_figure(plot: str | None) -> None:
 
 def check_json(out: str | None) -> None:
     """Refuse a bad name of a JSON file before any work is done."""
+    check_ending(out, ".json")
+
+
+def check_ending(out: str | None, ending: str) -> None:
+    """Refuse a file of another kind than the one that can be written."""
     check_folder("--out", out)
-    if out is not None and Path(out).suffix.lower() != ".json":
-        raise InputError("--out", out, "a file that ends in .json")
+    if out is not None and Path(out).suffix.lower() != ending:
+        raise InputError("--out", out, f"a file that ends in {ending}")
 
 
 def writing(parameter: str, path: str, write: Callable[[], None]) -> None:

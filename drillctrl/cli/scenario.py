@@ -24,18 +24,22 @@ _CHANGE = (
 )
 
 SURROUNDINGS = ("period", "measurement_delay", "actuator_lag", "limit", "rate_limit")
-_SURROUNDINGS = (
+SURROUNDING_OPTIONS = (
     click.option("--period", metavar="TIME", help="Sample and hold; else continuous."),
     click.option("--measurement-delay", metavar="TIME", help="Age of the measurements."),
     click.option("--actuator-lag", metavar="TIME", help="Time constant of the actuator."),
-    click.option("--limit", metavar="TORQUE", help="Largest |u|: 3, or '5 kN*m' with a rig."),
+    click.option(
+        "--limit",
+        metavar="TORQUE",
+        help="Largest |u|: 3, or '5 kN*m' with a rig; a drive's integral does not wind up there.",
+    ),
     click.option("--rate-limit", metavar="RATE", help="Fastest change of u: 5, or '50 kN*m/s'."),
 )
 
 
 def surroundings_options(command: Command) -> Command:
     """Add the options that say what surrounds a controller: clock, delays and limits."""
-    for option in reversed(_SURROUNDINGS):
+    for option in reversed(SURROUNDING_OPTIONS):
         command = option(command)
     return command
 
@@ -60,7 +64,7 @@ def controller_options(command: Command) -> Command:
             "--delay", default="fixed", show_default=True,
             help="Delayed outputs: fixed (τ0 ago) or current (τ ago).",
         ),
-        *_SURROUNDINGS,
+        *SURROUNDING_OPTIONS,
         click.option(
             "--noise", default="", metavar="NAME=DEVIATION",
             help="On each sample: theta=0.01,dtheta=0.1; with a rig 'dtheta=1 rpm'.",

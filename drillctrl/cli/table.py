@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.cli.controller_file import (
+    CONTROLLER_NAMES,
+    check_out,
+    controller_file_options,
+    in_units,
+    write_table,
+)
 from drillctrl.cli.drives import are_drives, deliver_drive_table
 from drillctrl.cli.gains import gain_scales, read_bounds
 from drillctrl.cli.grid import grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.progress import open_progress
-from drillctrl.cli.quantity import read_quantity
 from drillctrl.cli.roots import trials_option, wants_trials
 from drillctrl.cli.verb import Verb, naming
 
 if TYPE_CHECKING:
     from drillctrl.base.checkpoint import Checkpoint
-    from drillctrl.delay.structure import FeedbackStructure
     from drillctrl.tables.gain_table import GainTable
     from drillctrl.tables.grid import Grid
 
-CONTROLLERS = (".c", ".st", ".scl", ".xml", ".fmu")
-# What may go with a table that is there already.
-_OPTIONS = ("ramp", "outside", "fade", "hold", "watchdog", "rate_limit", "release")
-_CONTROLLER = ("period", "limit", "real", "fmi", *_OPTIONS)
-_WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot")
+_WITH_FROM = (*CONTROLLER_NAMES, "source", "require_stable", "as_json", "out", "plot")
 
 
 @click.command(name="table", cls=Verb)
@@ -72,27 +72,7 @@ _WITH_FROM = (*_CONTROLLER, "source", "require_stable", "as_json", "out", "plot"
 @click.option(
     "--from", "source", type=click.Path(), metavar="FILE", help="A saved table instead of a design."
 )
-@click.option(
-    "--period",
-    metavar="TIME",
-    help="Of a controller (.c …), such as 0.01; '10 ms' with a rig.",
-)
-@click.option("--limit", metavar="TORQUE", help="Its largest |u|, such as 5; '5 kN*m' with a rig.")
-@click.option("--ramp", type=int, metavar="SAMPLES", help="Of its switch-on (default: a delay).")
-@click.option(
-    "--outside", help="Where it vouches for nothing: fade (default) or hold the last good gains."
-)
-@click.option("--fade", type=int, metavar="SAMPLES", help="Of such a fade (default: a delay).")
-@click.option(
-    "--hold", type=int, metavar="SAMPLES", help="Missing in a row before it fades (default 3)."
-)
-@click.option("--watchdog", type=int, metavar="SAMPLES", help="Equal in a row before it fades.")
-@click.option("--rate-limit", metavar="RATE", help="Its fastest change: 5, or '50 kN*m/s'.")
-@click.option(
-    "--release", type=int, metavar="SAMPLES", help="Of its switch-off (default: at once)."
-)
-@click.option("--real", help="Arithmetic of a .c controller: double (default) or float.")
-@click.option("--fmi", help="Standard of an .fmu: 3.0 (default) or 2.0.")
+@controller_file_options
 @click.option(
     "--require-stable", is_flag=True, help="Exit with 3 if a node is not stable or refused."
 )
@@ -134,20 +114,20 @@ def table_command(
         if not deliver_drive_table(structure, options, as_json, out, plot) and require_stable:
             raise click.exceptions.Exit(3)
         return
-    controller = {name: options.pop(name) for name in _CONTROLLER}
+    controller = {name: options.pop(name) for name in CONTROLLER_NAMES}
     if source is not None:
         _refuse_design(ctx)
         from drillctrl.tables.files import load_table
 
         with naming("--from", "table"):
             result = load_table(source)
-        controller = _in_units(controller, result.grid)
-        _check_out(out, controller, result.grid, result.structure)
+        controller = in_units(controller, result.grid)
+        check_out(out, controller, result.grid, result.structure)
         checkpoint = None
     else:
         result, checkpoint, controller = _design(options, out, controller)
     if out is not None:
-        writing("--out", out, lambda: _write(result, out, controller))
+        writing("--out", out, lambda: write_table(result, out, controller))
     if checkpoint is not None:
         _finish(checkpoint)
     if plot is not None:
@@ -191,8 +171,8 @@ def _design(
     structure = preset_structure(options["structure"])
     scales = gain_scales(structure, grid.plant, grid.rig)
     structure = structure.with_bounds(read_bounds(options["bound"], structure, scales))
-    controller = _in_units(controller, grid)
-    _check_out(out, controller, grid, structure, trials)
+    controller = in_units(controller, grid)
+    check_out(out, controller, grid, structure, trials)
     with (
         open_executor(workers or 1, scheduler) as executor,
         nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,
@@ -225,99 +205,6 @@ def _surroundings(controller: dict[str, Any], grid: Grid) -> dict[str, float]:
     return {
         name: float(controller[name]) / unit[name] for name in unit if controller[name] is not None
     }
-
-
-def _in_units(controller: dict[str, Any], grid: Grid) -> dict[str, Any]:
-    """Return what was typed of a controller in the units of its table."""
-    from drillctrl.base import units
-
-    rig = grid.rig
-    scales = {
-        "period": (units.TIME, None if rig is None else rig.time_scale),
-        "limit": (units.TORQUE, None if rig is None else rig.torsional_stiffness),
-        "rate_limit": (
-            units.TORQUE_RATE,
-            None if rig is None else rig.torsional_stiffness / rig.time_scale,
-        ),
-    }
-    read = {
-        name: read_quantity(f"--{name.replace('_', '-')}", controller[name], *scale)
-        for name, scale in scales.items()
-        if controller[name] is not None
-    }
-    return {**controller, **read}
-
-
-def _check_out(
-    out: str | None,
-    controller: dict[str, Any],
-    grid: Grid,
-    structure: FeedbackStructure,
-    tried: bool = False,
-) -> None:
-    """Refuse what could not be written, before any work is done."""
-    ending = "" if out is None else Path(out).suffix.lower()
-    if ending not in CONTROLLERS:
-        for name, value in controller.items():
-            if value is not None and not (tried and name in ("period", "limit")):
-                raise InputError(name, value, "left out unless --out is a controller's source")
-    if out is None:
-        return
-    if ending not in CONTROLLERS:
-        from drillctrl.tables.files import check_table_path
-
-        with naming("--out", "table"):
-            check_table_path(out)
-        return
-    from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
-    from drillctrl.tables.export_st import check_st_name
-    from drillctrl.tables.settings import Options, checked_settings
-
-    for name in ("period", "limit"):
-        if controller[name] is None:
-            raise InputError(name, "(missing)", f"given for {out}")
-    given = {name: controller[name] for name in _OPTIONS if controller[name] is not None}
-    for name, goes_with in (("real", ".c"), ("fmi", ".fmu")):
-        if controller[name] is not None and ending != goes_with:
-            raise InputError(name, controller[name], f"left out unless --out ends in {goes_with}")
-    with naming("--out", "name"):
-        (check_st_name if ending in (".st", ".scl", ".xml") else check_c_name)(Path(out).stem)
-        checked_settings(
-            grid,
-            structure,
-            controller["period"],
-            controller["limit"],
-            cast(Options, given),
-        )
-        if ending == ".c":
-            check_c_header(Path(out).with_suffix(".h"))
-    if controller["real"] is not None:
-        check_real(controller["real"])
-    if ending == ".fmu":
-        from drillctrl.tables.export_fmu import check_fmu
-
-        check_fmu(Path(out).stem, controller["fmi"] or "3.0")
-
-
-def _write(result: GainTable, out: str, controller: dict[str, Any]) -> None:
-    path = Path(out)
-    given = {name: value for name, value in controller.items() if value is not None}
-    if path.suffix.lower() in (".st", ".scl", ".xml"):
-        from drillctrl.tables.export_st import export_st
-
-        export_st(result, path, **given)
-    elif path.suffix.lower() == ".fmu":
-        from drillctrl.tables.export_fmu import export_fmu
-
-        export_fmu(result, path, **given)
-    elif path.suffix.lower() == ".c":
-        from drillctrl.tables.export_c import export_c
-
-        export_c(result, path.parent, path.stem, **given)
-    else:
-        from drillctrl.tables.files import save_table
-
-        save_table(result, path)
 
 
 def _finish(checkpoint: Checkpoint) -> None:

@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 
 
 def gain_matrices(
@@ -47,7 +48,7 @@ def gain_matrices(
     return matrices[0], matrices[1]
 
 
-@takes_system
+@checks_kinds
 def close_loop(
     system: DelaySystem,
     feedback: FeedbackStructure,

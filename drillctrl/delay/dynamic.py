@@ -13,16 +13,17 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import with_channels
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 
 Controlled = tuple[DelaySystem, FeedbackStructure]
 
 _MOST_STATES = 20
 
 
-@takes_system
+@checks_kinds
 def pid_control(
     system: DelaySystem,
     input_name: str,
@@ -103,7 +104,7 @@ def pid_control(
     return grown, FeedbackStructure("pid", names, -most, most, zero, zero, (input_name,))
 
 
-@takes_system
+@checks_kinds
 def dynamic_control(
     system: DelaySystem,
     inputs: Sequence[str],
@@ -167,7 +168,7 @@ def dynamic_control(
     return grown, structure
 
 
-@takes_system
+@checks_kinds
 def observer_control(
     system: DelaySystem,
     inputs: Sequence[str],

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 
 
-@takes_system
+@checks_kinds
 def with_filter(
     system: DelaySystem, outputs: Sequence[str], time_constant: float, delay: float = 0.0
 ) -> DelaySystem:
@@ -73,7 +74,7 @@ def with_filter(
     )
 
 
-@takes_system
+@checks_kinds
 def with_late_output(
     system: DelaySystem, name: str, delay: float, late_name: str | None = None
 ) -> DelaySystem:
@@ -107,7 +108,7 @@ def with_late_output(
     )
 
 
-@takes_system
+@checks_kinds
 def with_actuator_lag(system: DelaySystem, name: str, time_constant: float) -> DelaySystem:
     """Return a system one of whose inputs acts through a first-order lag.
 

@@ -62,6 +62,8 @@ class FeedbackStructure:
         free gain or leaves its leader no room.
     """
 
+    made_by = "preset_structure('case1')"
+
     name: str
     outputs: tuple[str, ...]
     K1_lower: FloatArray

@@ -10,9 +10,8 @@ import numpy.typing as npt
 import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError, checked_number, takes
+from drillctrl.base.errors import InputError, checked_number
 
-_WANTED = "a DelaySystem, such as plant_system makes of a point"
 # Rows and columns whose sums differ by more than this are scaled.
 _UNBALANCED = 1e3
 
@@ -78,6 +77,8 @@ class DelaySystem:
     InputError
         If shapes, delays or names do not fit, or a number is not finite.
     """
+
+    made_by = "plant_system makes of a point"
 
     A0: FloatArray
     delayed: tuple[FloatArray, ...] = ()
@@ -206,10 +207,6 @@ class DelaySystem:
 
     def _size(self) -> FloatArray:
         return np.asarray(sum((np.abs(matrix) for matrix in self.delayed), np.abs(self.A0)))
-
-
-# What works on a linear system and on nothing else.
-takes_system = takes(DelaySystem, _WANTED)
 
 
 def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

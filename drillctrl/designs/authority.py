@@ -12,15 +12,9 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.workers import spread_out
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.drilling import (
-    ControlledSwing,
-    Drilling,
-    Swing,
-    cases_around,
-    controlled_swings,
-    cost_of_gains,
-    swing_families,
-)
+from drillctrl.designs.controlled_swings import ControlledSwing, controlled_swings
+from drillctrl.designs.drilling import Drilling
+from drillctrl.designs.swings import Swing, cost_of_gains, swing_families
 from drillctrl.designs.trials import MORE_STARTS, STARTS, UNDER_WAY, Trial, trial_run
 from drillctrl.designs.verdict import FAILURES, Verdict, judge, with_engagement
 from drillctrl.drilling.case import Case
@@ -200,7 +194,7 @@ def tried(
             break
         (more,) = judged(case, [known[best]], MORE_STARTS)
         known[best] = verdict(known[best], before + more)
-        for there in cases_around(case, objective)[1:]:
+        for there in objective.around(case)[1:]:
             if known[best].harmful:
                 break
             (runs,) = judged(there, [known[best]], STARTS)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.drilling import ASKED, Drilling
@@ -30,6 +31,7 @@ from drillctrl.synthesis.family import LoopFamily, loop_family
 from drillctrl.synthesis.objectives import EXACT, NO_REQUIREMENTS, Objective, Requirements
 
 
+@checks_kinds
 def design(
     point: Where,
     structure: str | FeedbackStructure = "case1",
@@ -112,9 +114,8 @@ def design(
     family = loop_family(case.system(chosen.inputs), chosen)
     others = []
     if isinstance(objective, WorstCase):
-        _, here = case.physics(f"objective {objective.name}")
-        for other in objective.around(here)[1:]:
-            others.append(loop_family(case.at(other).system(chosen.inputs), chosen))
+        for other in objective.around(case)[1:]:
+            others.append(loop_family(other.system(chosen.inputs), chosen))
     solution = problem.solve(family, objective, requirements, others, seed)
     result = assess(case, chosen, *chosen.gains(solution.gains))
     alphas = [spectral_abscissa(other.loop(solution.gains)) for other in others]
@@ -151,6 +152,7 @@ def _meets(
     )
 
 
+@checks_kinds
 def analyze(
     point: Where,
     structure: str | FeedbackStructure | None = None,

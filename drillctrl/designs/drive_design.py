@@ -7,9 +7,9 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.text import wrapped
-from drillctrl.designs.design import analyze
 from drillctrl.designs.result import Analysis
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
@@ -24,6 +24,8 @@ from drillctrl.strings.rig import StringRig
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from drillctrl.designs.result import Analysis
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +115,7 @@ class DriveDesign:
         return self.found.plot(name)
 
 
+@checks_kinds
 def design_drive(
     where: RigPoint | Rig,
     structure: str,
@@ -152,6 +155,9 @@ def design_drive(
     found = compare_drives(rig, [drive_control(structure, rig, length_error)], falling)
     drilling = modes = None
     if isinstance(where, RigPoint):
+        # Half of a second to load, and a law without a point has no use for it.
+        from drillctrl.designs.design import analyze
+
         case = as_case(where, driven_plant(rig, found.drives[0].control))
         drilling = analyze(case)
         modes = named_roots(case, None, drilling.K1, drilling.K2)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.multiplicity import Root
 from drillctrl.spectrum.roots import known_roots
@@ -111,7 +112,7 @@ def discretised_radius(
     return SpectralRadius(scheme.spectral_radius, scheme.m, scheme.order, scheme.growth_rate)
 
 
-@takes_system
+@checks_kinds
 def analyze_loop(system: DelaySystem) -> LoopAnalysis:
     """Analyse a delay system by roots and count alone."""
     roots, floor = known_roots(system, _MOST)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import feedback_lags, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
@@ -16,6 +17,7 @@ from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.spectrum.batch import batch_abscissas
 
 
+@checks_kinds
 def spectral_abscissas(
     point: Where,
     parameters: Mapping[str, npt.ArrayLike] | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
@@ -11,6 +12,7 @@ from drillctrl.drilling.case import Where, as_case
 from drillctrl.robustness.margins import ParameterMargin, parameter_margin
 
 
+@checks_kinds
 def point_margins(
     point: Where,
     feedback: FeedbackStructure,

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.base.workers import open_executor
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.authority import Candidate, between, candidates, irregular, tried
-from drillctrl.designs.drilling import (
-    ASKED,
-    Drilling,
-    OnMotion,
-    Swing,
-    followed_swings,
-    largest_growth,
-    measured_swings,
-)
+from drillctrl.designs.controlled_swings import OnMotion, followed_swings
+from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.result import Analysis, Design, analysis_fields, assess
+from drillctrl.designs.swings import Swing, largest_growth, measured_swings
 from drillctrl.drilling.case import Case
 from drillctrl.motion.loop import torsional_system
 from drillctrl.simulation.controller import Controller
@@ -30,6 +28,9 @@ from drillctrl.synthesis.objectives import Requirements
 _FEW = 12
 # Of the bounds, within which gains are looked for.
 SHARES = tuple(2.0**-k for k in range(8))
+# Of a bound: gains below are none.
+_NONE = 1e-6
+NONE_HELP = "no gains within the bounds do better here than no control, to which the search returns"
 
 
 def fits_motion(case: Case, structure: FeedbackStructure) -> bool:
@@ -48,6 +49,11 @@ def fits_motion(case: Case, structure: FeedbackStructure) -> bool:
 def _within(torsion: DelaySystem, structure: FeedbackStructure) -> bool:
     drives, sees = set(torsion.input_names), set(torsion.output_names)
     return set(structure.inputs) <= drives and set(structure.outputs) <= sees
+
+
+def _are_none(structure: FeedbackStructure, gains: FloatArray) -> bool:
+    """Whether gains are zero but for the rounding of their search."""
+    return bool((np.abs(gains) <= _NONE * (structure.upper - structure.lower)).all())
 
 
 def motion_design(
@@ -120,6 +126,8 @@ def motion_design(
     known = analysis_fields(assess(case, structure, *structure.gains(gains)))
     if best.verdict is not None:
         known["verdict"] = best.verdict
+        if not best.verdict.recommended and _are_none(structure, gains):
+            known["verdict"] = replace(best.verdict, reason=NONE_HELP)
     made = followed_swings(case, objective, swings, structure, gains)
     growth = max((each.growth for each in made), default=best.growth)
     known["elapsed_seconds"] = time.perf_counter() - began

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none, set_out
 from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
@@ -22,6 +23,8 @@ from drillctrl.synthesis.family import loop_family
 
 # How far left of a design its explicit boundary is asked for better gains.
 _LEFT = 1e-3
+# States up to which margins of the point and a more robust alternative are looked for.
+_SOON = 20
 _GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
 
 Progress = Callable[[str], None]
@@ -59,7 +62,7 @@ class Report:
         where α is not what was minimised, and where there are more than two gains or several
         inputs.
     alternative : Alternative or None
-        Beside a stable design that minimises α and is not refused.
+        Beside a stable design of a plant of few states that minimises α and is not refused.
     remedies : tuple of Remedy
         What else stabilises the point, if a design does not.
     quieter : tuple of Quieter
@@ -115,6 +118,7 @@ class Report:
         return set_out(lines)
 
 
+@checks_kinds
 def report(result: Analysis, progress: Progress | None = None) -> Report:
     """Find out what a loop stands, and what would be better or would help.
 
@@ -135,17 +139,19 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
         if progress is not None:
             progress(what)
 
+    # Of a plant of many states these take longer than all else together.
+    soon = len(result.plant.A0) <= _SOON
     stands = None
     if result.structure is not None:
         at("margins")
-        stands = robustness_of(result)
+        stands = robustness_of(result, with_point=soon)
     modes = named_roots(result.case, result.structure, result.K1, result.K2)
     if not isinstance(result, Design):
         return Report(result, stands, None, None, (), modes=modes)
     at("bounds")
     decision = boundary_decision(result)
     other = None
-    if result.stable and result.minimises_alpha and not result.verdict.refused:
+    if soon and result.stable and result.minimises_alpha and not result.verdict.refused:
         at("a more robust alternative")
         found = robust_alternative(result)
         other = Alternative(found, robustness_of(found))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none
 from drillctrl.designs.fragility import Fragility, fragility, perturbed_plants
 from drillctrl.designs.margins import point_margins
@@ -33,7 +34,8 @@ class Robustness:
     delay_margin : DelayMargin or None
         How wrong the delays may be; None for a loop that is unstable or without delay.
     point_margins : dict or None
-        How wrong ψ, δ0 and ω0 may each be; None for an unstable loop or without a point.
+        How wrong ψ, δ0 and ω0 may each be; None for an unstable loop, without a point, or where
+        they were not asked for.
     fragility : Fragility
         The loop when gains, rock or delay are a little off.
     """
@@ -74,8 +76,16 @@ def relative_radius(result: Analysis) -> StabilityRadius:
     return stability_radius(loop, [float(np.linalg.norm(m, 2)) for m in matrices])
 
 
-def robustness_of(result: Analysis) -> Robustness:
+def robustness_of(result: Analysis, with_point: bool = True) -> Robustness:
     """Return what a loop with feedback stands.
+
+    Parameters
+    ----------
+    result : Analysis
+        With feedback.
+    with_point : bool
+        Whether margins of the point are worked out, which takes minutes for a plant of a hundred
+        states.
 
     Raises
     ------
@@ -87,7 +97,7 @@ def robustness_of(result: Analysis) -> Robustness:
     structure, loop = result.structure, result.system()
     changed = perturbed_plants(result.plant, result.case)
     margins = None
-    if result.stable and result.case.drills:
+    if with_point and result.stable and result.case.drills:
         margins = point_margins(result.case, structure, result.K1, result.K2)
     return Robustness(
         relative_radius(result),
@@ -97,6 +107,7 @@ def robustness_of(result: Analysis) -> Robustness:
     )
 
 
+@checks_kinds
 def robust_alternative(result: Analysis, give_up: float = GIVE_UP) -> Analysis:
     """Return gains that decay almost as fast, and faster when something is off.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import close_loop, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where, as_case
@@ -38,6 +39,7 @@ class RootSensitivity:
     parameters: dict[str, complex]
 
 
+@checks_kinds
 def root_sensitivity(
     point: Where,
     structure: FeedbackStructure | None = None,

@@ -29,13 +29,14 @@ _STEPS = 400_000
 
 
 _UNDER_WAY = "control that is switched on in the midst of what follows a kick"
-# A bit that starts from rest or from stick says less of gains than of the rig.
 STARTS = tuple(start_named(name) for name in ("small", "kick", "back"))
+# A bit that starts from rest or from stick says less of gains than of the rig: many a string
+# turns back out of a stick without any. What they do then says when to switch them on.
+STANDING = tuple(start_named(name) for name in ("rest", "stick"))
 # Irregular motions depend on how they start more than on the gains: what is chosen by runs is
 # tried from these too.
 MORE_STARTS = (
-    start_named("rest"),
-    start_named("stick"),
+    *STANDING,
     Start("strong", "steady", 1.0, 0.7, "a kick forward by 70 % of the speed"),
     Start("nudge", "steady", 0.2, 0.25, "a kick forward by a quarter of the speed"),
     Start("nudge back", "steady", 0.2, -0.25, "a kick back by a quarter of the speed"),
@@ -104,7 +105,9 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
     )
 
 
-def uncontrolled_runs(where: Where, starts: Sequence[Start] = STARTS) -> dict[str, Figures]:
+def uncontrolled_runs(
+    where: Where, starts: Sequence[Start] = (*STARTS, *STANDING)
+) -> dict[str, Figures]:
     """Return what becomes of every start without control, by its name."""
     case = as_case(where)
     return {start.name: trial_run(case, None, start) for start in starts}

@@ -8,7 +8,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
-from drillctrl.designs.drilling import OnMotion
+from drillctrl.designs.controlled_swings import OnMotion
 from drillctrl.designs.loop_analysis import LoopAnalysis, SpectralRadius
 from drillctrl.designs.mode_shift import ModeShift
 from drillctrl.designs.trials import Trial

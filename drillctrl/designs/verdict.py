@@ -11,7 +11,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.trials import Trial, trial_runs
+from drillctrl.designs.trials import STANDING, Trial, trial_runs
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
@@ -99,7 +99,11 @@ def try_gains(
     except InputError as error:
         return Verdict(None, f"{LEFT_OUT}: the simulator cannot close this loop ({error})")
     trials = trial_runs(case, controller, uncontrolled=uncontrolled, spare=spare)
-    return judge(trials, stable)
+    verdict = judge(trials, stable)
+    if spare or not verdict.recommended:
+        return verdict
+    standing = trial_runs(case, controller, uncontrolled=uncontrolled, starts=STANDING)
+    return with_engagement(verdict, standing, "switch them on once the bit turns")
 
 
 def judge(
@@ -143,17 +147,21 @@ def judge(
     return Verdict(True, f"{small}: {_beside(rest)}", runs)
 
 
-def with_engagement(verdict: Verdict, runs: Sequence[Trial]) -> Verdict:
-    """Return a verdict with trials in which control is switched on under way.
+def with_engagement(
+    verdict: Verdict,
+    runs: Sequence[Trial],
+    advice: str = "switch them on while the bit swings little",
+) -> Verdict:
+    """Return a verdict with trials in which control is switched on where it need not be.
 
-    Where they do worse than no control, gains are to be switched on while the bit swings little;
-    the verdict says so.
+    Under way, or while the bit stands still. Where gains do worse there than no control, the
+    verdict says when to switch them on.
     """
     trials = (*verdict.trials, *runs)
-    worse = next((text for trial in runs if (text := _harm(trial)) is not None), None)
+    worse = next((text for trial in runs if (text := _worse(trial)) is not None), None)
     if worse is None or not verdict.recommended:
         return replace(verdict, trials=trials)
-    reason = f"{verdict.reason}; but switch them on while the bit swings little: {worse}"
+    reason = f"{verdict.reason}; but {advice}: {worse}"
     return replace(verdict, reason=reason, trials=trials)
 
 
@@ -190,6 +198,15 @@ def _what(found: Figures) -> str:
     if found.swing is None or found.outcome == Outcome.SETTLES:
         return text
     return f"{text} ({_swing(found)})"
+
+
+def _worse(trial: Trial) -> str | None:
+    """Say in what the controlled run is worse, unless both end the same way."""
+    free = trial.uncontrolled
+    alike = (
+        free is not None and free.outcome in FAILURES and free.outcome == trial.controlled.outcome
+    )
+    return None if alike else _harm(trial)
 
 
 def _harm(trial: Trial) -> str | None:

@@ -255,8 +255,7 @@ def _objective_lines(design: DesignValues) -> Lines:
         case SemiDiscrete(m=m, order=order):
             goal = f"ln ρ(D)/Δt of the semi-discretisation (m = {m}, order {order})"
         case WorstCase() as case:
-            assert design.point is not None
-            goal = f"largest α of {len(case.around(design.point))} points"
+            goal = f"largest α of {len(case.around(design.case))} points"
         case Robust(epsilon=epsilon):
             goal = f"largest Re s with relative errors of the plant up to {epsilon:g}"
         case Drilling():

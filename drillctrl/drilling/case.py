@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import DIMENSIONLESS, Language
 from drillctrl.delay.system import DelaySystem
 from drillctrl.drilling.linear import LinearArrays, linear_arrays
@@ -222,6 +223,7 @@ def _input(plant: Plant, name: str) -> int:
 Where = OperatingPoint | RigPoint | DelaySystem | Case
 
 
+@checks_kinds
 def as_case(where: Where, plant: Plant | None = None) -> Case:
     """Return a case from whatever a verb was given.
 
@@ -256,6 +258,7 @@ def as_case(where: Where, plant: Plant | None = None) -> Case:
     raise InputError("point", type(where).__name__, _KINDS)
 
 
+@checks_kinds
 def plant_system(where: Where, inputs: Sequence[str] | None = ("torque",)) -> DelaySystem:
     """Return the linear delayed system of a case (Eqs. 23, 25, 26, 34, 35).
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock, PaperLaw
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import (
@@ -241,6 +242,7 @@ def evaluator(form: Expressions, outputs: Sequence[Any]) -> Evaluator:
     return evaluate
 
 
+@checks_kinds
 def paper_plant(
     bit: BitRock | None = None,
     string: StringModel | Callable[[Coefficients], String] | None = None,
@@ -284,6 +286,7 @@ def rig_plant() -> Plant:
     return Plant(PaperLaw(), LumpedString(), (), RIG_PARAMETER_NAMES, rig_coefficients)
 
 
+@checks_kinds
 def top_drive_plant(inertia_ratio: float) -> Plant:
     """Return the dimensionless plant with a top drive.
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import steady_state
 
 # Bits from 3 1/4 in to 17 1/2 in; soft clay to the hardest granite; 100 t on bit.
@@ -15,7 +16,7 @@ _DEEPEST_CUT = 0.03
 _HEAVIEST = 1e6
 
 
-@takes_rig_point
+@checks_kinds
 def plausibility_notes(point: RigPoint) -> tuple[str, ...]:
     """Return a sentence for each number that no drilling rig is known to have.
 

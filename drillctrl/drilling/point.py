@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from drillctrl.base.errors import InputError, checked_integer, checked_number, takes
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.language import LANGUAGES, Language, language_named
 from drillctrl.drilling.rig import Rig
 
@@ -105,6 +105,8 @@ class RigPoint:
     units : {"si", "field", "dimensionless"}
         In which people are told results; nothing that is computed depends on it.
     """
+
+    made_by = "RigPoint(table1(), speed, rate), in rad/s and m/s"
 
     rig: Rig
     rotary_speed: float
@@ -222,7 +224,3 @@ def changed_by(
             penetration_rate=where.penetration_rate * rate,
         )
     return where.with_changes(omega0=where.omega0 * speed, delta0=where.delta0 * rate / speed)
-
-
-# What works in the units of a rig.
-takes_rig_point = takes(RigPoint, "a RigPoint: a rig, its speed and rate of penetration")

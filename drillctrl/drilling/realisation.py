@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.coefficients import Expression
@@ -175,7 +176,7 @@ def _inverse(mass: ca.SX) -> ca.SX:
     other = [i for i in range(size) if i not in plain]
     if not plain:
         return ca.inv(mass)
-    first = ca.SX(ca.inv(ca.DM(mass[plain, plain])))
+    first = ca.SX(_in_numbers(ca.DM(mass[plain, plain])))
     if not other:
         return first
     across = first @ mass[plain, other]
@@ -186,6 +187,19 @@ def _inverse(mass: ca.SX) -> ca.SX:
     inverse[other, plain] = -(last @ across.T)
     inverse[other, other] = last
     return inverse
+
+
+def _in_numbers(mass: ca.DM) -> ca.DM:
+    """Return the inverse of a matrix of numbers, sharpened.
+
+    Modes of a string that do not act on each other are told by the bit's place instead of a
+    coordinate of their own: only in a sharp inverse are they seen not to.
+    """
+    matrix = np.asarray(mass.full(), dtype=np.longdouble)
+    inverse = np.linalg.inv(mass.full()).astype(np.longdouble)
+    for _ in range(3):
+        inverse = inverse + inverse @ (np.eye(len(matrix), dtype=np.longdouble) - matrix @ inverse)
+    return ca.DM(inverse.astype(float))
 
 
 def _check_names(made: Realisation) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
-from drillctrl.base.files import check_regular, write_text
+from drillctrl.base.files import check_regular
 from drillctrl.base.units import Dimension
 
 STANDARD_GRAVITY = 9.80665
@@ -68,6 +68,8 @@ class Rig:
     InputError
         If a value is not finite or not in its range.
     """
+
+    made_by = "table1()"
 
     mass: float = _parameter(units.MASS)
     inertia: float = _parameter(units.INERTIA)
@@ -201,18 +203,10 @@ def rig_from_mapping(data: dict[str, Any], source: str) -> Rig:
         return Rig(**values)
 
 
-def save_rig(rig: Rig, path: str | Path) -> None:
-    """Write a rig of lumped numbers to a TOML file that `load_rig` reads back without loss.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; an existing file is then left as it was.
-    """
-    import tomli_w
-
+def rig_mapping(rig: Rig) -> dict[str, Any]:
+    """Return the keys and texts from which `rig_from_mapping` reads a rig without loss."""
     data: dict[str, Any] = {"blades": rig.blades}
     for item in _dimensional_fields():
         value, dimension = getattr(rig, item.name), item.metadata["dimension"]
         data[item.name] = f"{value!r} {dimension.unit}" if dimension.unit else value
-    write_text(path, tomli_w.dumps(data))
+    return data

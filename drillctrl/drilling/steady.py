@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError, checked_number, interval_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import PaperLaw, steady_delay, steady_depth, steady_load
 from drillctrl.drilling.coefficients import (
     RIG_PARAMETER_NAMES,
     Coefficients,
     rig_coefficients,
 )
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
 
 
@@ -59,7 +60,7 @@ def _coefficients(point: RigPoint) -> Coefficients:
     return rig_coefficients(SimpleNamespace(**rig_parameter_values(point)))
 
 
-@takes_rig_point
+@checks_kinds
 def steady_state(point: RigPoint) -> SteadyState:
     """Return loads, deformations and depth of cut of steady drilling (Eqs. 10-12)."""
     c = _coefficients(point)
@@ -88,6 +89,7 @@ def weight_on_bit(
     return np.asarray(load.weight_on_bit, dtype=float)
 
 
+@checks_kinds
 def rig_point_at_weight_on_bit(rig: Rig, rotary_speed: float, weight_on_bit: float) -> RigPoint:
     """Return the rig point whose steady weight on bit is the given one.
 

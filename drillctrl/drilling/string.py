@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.coefficients import Coefficients, Expression
 from drillctrl.drilling.part import Part
 from drillctrl.drilling.quantities import RATES, checked_quantity
@@ -81,6 +82,7 @@ class String:
             checked_quantity(name, quantity)
 
 
+@checks_kinds
 def spring_string(
     coordinates: Mapping[str, str],
     masses: Mapping[str, Expression],

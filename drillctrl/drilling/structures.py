@@ -8,6 +8,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 
 STRUCTURE_NAMES = ("p", "case1", "pd", "case2")
@@ -16,6 +17,7 @@ RATE_BOUND = 5.0
 AXIAL_OUTPUTS = ("x", "dx")
 
 
+@checks_kinds
 def preset_structure(name: str) -> FeedbackStructure:
     """Return a preset structure with the paper's bounds (Eqs. 37, 39, 43).
 
@@ -54,6 +56,7 @@ def _torque_structure(name: str, bounds: Sequence[float], *, delayed: bool) -> F
     return FeedbackStructure(name, outputs, -box, box, -past, past)
 
 
+@checks_kinds
 def feed(
     beside: str | FeedbackStructure | None = None,
     *,
@@ -126,6 +129,7 @@ def _side_by_side(one: FeedbackStructure, two: FeedbackStructure) -> FeedbackStr
     )
 
 
+@checks_kinds
 def soft_torque(stiffness: float = 10.0, damping: float = 10.0) -> FeedbackStructure:
     """Return PI speed control of a top drive: drive = −k φ − d φ' (soft torque).
 

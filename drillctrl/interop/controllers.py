@@ -12,6 +12,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.extras import required
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 
@@ -32,6 +33,7 @@ def _tap(delay: float, period: float) -> tuple[int, float]:
     return k, max(delay / period - k, 0.0)
 
 
+@checks_kinds
 def controller_system(
     structure: FeedbackStructure,
     K1: npt.ArrayLike,
@@ -87,6 +89,7 @@ def controller_system(
     )
 
 
+@checks_kinds
 def scheduled_controller(
     structure: FeedbackStructure,
     gains: Gains,

@@ -11,7 +11,8 @@ import scipy.linalg
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.extras import required
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum.characteristic import magnitude_bound
 from drillctrl.spectrum.semidiscretization import semidiscretize
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 _BAND_POINTS = 400
 
 
-@takes_system
+@checks_kinds
 def lifted_system(system: DelaySystem, m: int | None = None, order: int = 1) -> control.StateSpace:
     """Return the semi-discretised system as discrete-time python-control states.
 
@@ -97,7 +98,7 @@ class PadeApproximation:
     frequency: float
 
 
-@takes_system
+@checks_kinds
 def pade_approximation(
     system: DelaySystem, degree: int = 4, highest_frequency: float | None = None
 ) -> PadeApproximation:

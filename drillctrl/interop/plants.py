@@ -9,12 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem
 
 if TYPE_CHECKING:
     import control
 
 
+@checks_kinds
 def from_control(
     plant: control.StateSpace,
     input_delay: float | Sequence[float] = 0.0,

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.extras import required
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
 
 # What is smaller is left out at high frequencies: gain margins are looked for up to its inverse.
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import control
 
 
-@takes_system
+@checks_kinds
 def to_frd(
     system: DelaySystem, omega: npt.ArrayLike | None = None
 ) -> control.FrequencyResponseData:
@@ -48,7 +49,7 @@ def to_frd(
     )
 
 
-@takes_system
+@checks_kinds
 def loop_frd(
     system: DelaySystem,
     structure: FeedbackStructure,

@@ -14,6 +14,7 @@ import scipy
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
@@ -308,6 +309,7 @@ def _fitted(
     return RationalResponse(float(found[0]), ordered, residues, error, band)
 
 
+@checks_kinds
 def bit_band(
     where: Where,
     amplitude: float,

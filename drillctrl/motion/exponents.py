@@ -8,6 +8,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.floquet import check_continuous, floquet
@@ -19,6 +20,7 @@ _REACHED, _LONGEST = 20.0, 1000.0
 _SHIFT = 1e-4
 
 
+@checks_kinds
 def orbit_exponents(
     where: Where, controller: Controller | None = None, **options: Any
 ) -> ComplexArray | None:

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.motion.torsion import answering, torsional_states
 
 
+@checks_kinds
 def torsional_system(
     where: Where, value: complex, frequency: float, inputs: Sequence[str] | None = None
 ) -> DelaySystem:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where
 from drillctrl.motion.record import halves
 from drillctrl.motion.response import KICKS, settling_time, turned_case
@@ -69,6 +70,7 @@ class AxialOrbit:
         return self.settles or self.period is not None
 
 
+@checks_kinds
 def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOrbit:
     """Return the axial orbit that a bit reaches while it turns at Ω0.
 

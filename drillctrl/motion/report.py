@@ -3,61 +3,15 @@
 from __future__ import annotations
 
 import math
-import statistics
 import textwrap
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from drillctrl.drilling.case import Case
-from drillctrl.drilling.quantities import si_scale
-from drillctrl.motion.band import BitBand
+from drillctrl.base.text import finite_or_none
 from drillctrl.motion.orbit import AxialOrbit
 from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
-from drillctrl.motion.threshold import ModeAlong
-from drillctrl.spectrum.roots import spectral_abscissa
-
-
-class Units(NamedTuple):
-    """What dimensionless units are in those that are told; 1 where there is no rig.
-
-    ``turn`` is what an angular frequency is divided by to be told: in Hz of a rig.
-    """
-
-    response: float
-    time: float
-    weight: float
-    torque: float
-    turn: float
-    response_name: str
-    rate_name: str
-    weight_name: str = ""
-    torque_name: str = ""
-
-
-def units_of(case: Case) -> Units:
-    """Return the units of the fields of a case: SI where there is a rig."""
-    if case.rig is None:
-        return Units(1.0, 1.0, 1.0, 1.0, 1.0, "", "")
-    weight, torque, time = (si_scale(name, case.rig) for name in ("force", "torque", "time"))
-    turn = 2.0 * math.pi * time
-    return Units(torque * time, time, weight, torque, turn, "N·m·s/rad", "1/s", "N", "N·m")
-
-
-def told_units(case: Case) -> Units:
-    """Return the units in which people are told of a case."""
-    language = case.language
-    if not language.units:
-        return Units(1.0, 1.0, 1.0, 1.0, 1.0, "", "")
-    si = units_of(case)
-    return si._replace(
-        response=language.number("impedance", si.response),
-        weight=language.number("force", si.weight),
-        torque=language.number("torque", si.torque),
-        response_name=language.unit("impedance"),
-        weight_name=language.unit("force"),
-        torque_name=language.unit("torque"),
-    )
+from drillctrl.motion.units import Units, told_units, units_of
 
 
 def motion_fields(
@@ -81,24 +35,24 @@ def motion_fields(
         "schema": "drillctrl/bit/1",
         "units": "SI" if found.case.rig is not None else "dimensionless",
         "response": [_response_fields(each, units) for each in responses],
-        "mean_torque": _number(torque),
-        "mean_weight": _number(weight),
-        "steady_torque": _number(torque / orbit.torque_ratio),
-        "steady_weight": _number(weight / orbit.weight_ratio),
-        "held_fraction": _number(orbit.held),
-        "lifted_fraction": _number(orbit.lifted),
+        "mean_torque": finite_or_none(torque),
+        "mean_weight": finite_or_none(weight),
+        "steady_torque": finite_or_none(torque / orbit.torque_ratio),
+        "steady_weight": finite_or_none(weight / orbit.weight_ratio),
+        "held_fraction": finite_or_none(orbit.held),
+        "lifted_fraction": finite_or_none(orbit.lifted),
         "periodic": orbit.periodic,
         "orbit": {
             "settles": orbit.settles,
             "periodic": orbit.periodic,
             "period": None if orbit.period is None else orbit.period * units.time,
-            "weight_on_bit": _number(orbit.weight * units.weight),
-            "torque_on_bit": _number(orbit.torque * units.torque),
-            "weight_ratio": _number(orbit.weight_ratio),
-            "torque_ratio": _number(orbit.torque_ratio),
-            "held_fraction": _number(orbit.held),
-            "lifted_fraction": _number(orbit.lifted),
-            "deepest_cut_ratio": _number(orbit.deepest),
+            "weight_on_bit": finite_or_none(orbit.weight * units.weight),
+            "torque_on_bit": finite_or_none(orbit.torque * units.torque),
+            "weight_ratio": finite_or_none(orbit.weight_ratio),
+            "torque_ratio": finite_or_none(orbit.torque_ratio),
+            "held_fraction": finite_or_none(orbit.held),
+            "lifted_fraction": finite_or_none(orbit.lifted),
+            "deepest_cut_ratio": finite_or_none(orbit.deepest),
             "broken": None if orbit.broken is None else str(orbit.broken),
         },
         "forced_swing": found.floor,
@@ -111,13 +65,13 @@ def _response_fields(response: BitResponse, units: Units) -> dict[str, Any]:
     return {
         "frequency": response.frequency / units.turn,
         "amplitude": response.amplitude,
-        "real": _number(value.real),
-        "imag": _number(value.imag),
-        "error": _number(response.error * units.response),
-        "mean_torque": _number(response.torque * units.torque),
-        "mean_weight": _number(response.weight * units.weight),
-        "held_fraction": _number(response.held),
-        "lifted_fraction": _number(response.lifted),
+        "real": finite_or_none(value.real),
+        "imag": finite_or_none(value.imag),
+        "error": finite_or_none(response.error * units.response),
+        "mean_torque": finite_or_none(response.torque * units.torque),
+        "mean_weight": finite_or_none(response.weight * units.weight),
+        "held_fraction": finite_or_none(response.held),
+        "lifted_fraction": finite_or_none(response.lifted),
         "broken": None if response.broken is None else str(response.broken),
     }
 
@@ -155,29 +109,25 @@ def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
     return {
         "amplitude": each.amplitude,
         "frequency": response.frequency / units.turn,
-        "response_re": _number(value.real),
-        "response_im": _number(value.imag),
-        "response_error": _number(response.error * units.response),
-        "response_scatter": _number(response.scatter * units.response),
-        "damping_left": _number(swing.mode.damping * units.response + value.real)
+        "response_re": finite_or_none(value.real),
+        "response_im": finite_or_none(value.imag),
+        "response_error": finite_or_none(response.error * units.response),
+        "response_scatter": finite_or_none(response.scatter * units.response),
+        "damping_left": finite_or_none(swing.mode.damping * units.response + value.real)
         if math.isfinite(response.error)
         else None,
-        "growth_rate": _number(each.root.real / units.time),
-        "growth_rate_error": _number(each.error / units.time),
+        "growth_rate": finite_or_none(each.root.real / units.time),
+        "growth_rate_error": finite_or_none(each.error / units.time),
         "sign": each.sign,
-        "weight_on_bit": _number(response.weight * units.weight),
-        "torque_on_bit": _number(response.torque * units.torque),
-        "held_fraction": _number(response.held),
-        "lifted_fraction": _number(response.lifted),
+        "weight_on_bit": finite_or_none(response.weight * units.weight),
+        "torque_on_bit": finite_or_none(response.torque * units.torque),
+        "held_fraction": finite_or_none(response.held),
+        "lifted_fraction": finite_or_none(response.lifted),
         "periods": response.periods,
         "ripple": response.ripple,
-        "rippled": _number(response.rippled),
+        "rippled": finite_or_none(response.rippled),
         "broken": None if response.broken is None else str(response.broken),
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def motion_summary(found: DrillingMotion) -> str:
@@ -274,110 +224,6 @@ def verdict(swing: ModeSwing) -> list[str]:
     return told
 
 
-def along_fields(found: ModeAlong) -> dict[str, Any]:
-    """Return the JSON fields of a mode over speed or rate; in SI where there is a rig."""
-    units, own = units_of(found.case), found.own_value
-    return {
-        "along": found.along,
-        "unit": _along_unit(found),
-        "mode": found.number,
-        "points": [
-            {
-                "value": float(value),
-                "amplitude": each.amplitude,
-                # Where H is not known, neither is this.
-                "damping_left": _number(float(left) * units.response)
-                if math.isfinite(each.error)
-                else None,
-                "growth_rate": _number(each.root.real / units.time),
-                "growth_rate_error": _number(each.error / units.time),
-                "sign": each.sign,
-            }
-            for value, left, each in zip(found.values, found.damping_left, found.at, strict=True)
-        ],
-        "thresholds": [
-            {
-                "decays": each.decays,
-                "value": each.factor * own,
-                "low": each.low * own,
-                "high": each.high * own,
-            }
-            for each in found.thresholds
-        ],
-    }
-
-
-def _along_unit(found: ModeAlong) -> str:
-    if found.case.rig is None:
-        return ""
-    return "rpm" if found.along == "speed" else "m/h"
-
-
-def along_summary(found: ModeAlong) -> str:
-    """Return what is told on a terminal of a mode over speed or rate."""
-    units, (factor, unit) = told_units(found.case), found.told
-    own = found.own_value * factor
-    name = unit or {"speed": "ω0", "rate": "V0"}[found.along]
-    held = {"speed": "the rate of penetration held", "rate": "the rotary speed held"}[found.along]
-    amplitude = statistics.median(each.amplitude for each in found.at)
-    lines = [
-        f"Torsional mode {found.number} at a swing of {amplitude:.2g}, {held}",
-        f"{name:>9} {'damping left':>13} {'growth':>9} {'±':>8}",
-    ]
-    for value, left, each in zip(factor * found.values, found.damping_left, found.at, strict=True):
-        if not math.isfinite(each.error):
-            broken = each.response.broken
-            told = "the bit swings of itself" if broken is None else broken.sentence
-            lines.append(f"{value:9.4g} {told}")
-            continue
-        growth = f"{each.root.real / units.time:9.4f} {each.error / units.time:8.2g}"
-        lines.append(f"{value:9.4g} {left * units.response:13.4g} {growth}")
-    for threshold in found.thresholds:
-        between = f"between {threshold.low * own:.4g} and {threshold.high * own:.4g}"
-        lines.append(f"Decays {threshold.decays} {threshold.factor * own:.4g} {unit} ({between}).")
-    if not found.thresholds:
-        sure = {each.sign for each in found.at} - {0}
-        verb = "Decays" if sure == {-1} else "Grows"
-        lines.append(f"{verb} wherever it is sure." if sure else "It is sure nowhere.")
-    unsure = [
-        value for value, each in zip(factor * found.values, found.at, strict=True) if not each.sign
-    ]
-    if unsure:
-        listed = ", ".join(f"{value:.4g}" for value in unsure)
-        lines.append(f"Not sure at {listed} {unit}: the simulator must decide there.")
-    return "\n".join(lines)
-
-
-def band_fields(found: BitBand) -> dict[str, Any]:
-    """Return the JSON fields of a band; in SI where there is a rig."""
-    units = units_of(found.case)
-    model = found.rational()
-    growth = spectral_abscissa(found.system())
-    return {
-        "samples": [
-            {
-                "frequency": each.frequency / units.time,
-                "amplitude": each.amplitude,
-                "response_re": _number(each.value.real * units.response),
-                "response_im": _number(each.value.imag * units.response),
-                "response_error": _number(each.error * units.response),
-            }
-            for each in found.responses
-        ],
-        "model": {
-            "constant": model.constant * units.response,
-            "poles": [[p.real / units.time, p.imag / units.time] for p in model.poles.tolist()],
-            "residues": [
-                [r.real * units.response / units.time, r.imag * units.response / units.time]
-                for r in model.residues.tolist()
-            ],
-            "error": model.error * units.response,
-        },
-        "growth_rate": growth / units.time,
-        "growing_roots": found.count_growing(),
-    }
-
-
 def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
     """Return what is told of H at frequencies of one's own on a terminal."""
     units = told_units(found.case)
@@ -398,32 +244,3 @@ def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -
     for swing in found.modes:
         lines += ["", *_mode_lines(swing, units)]
     return "\n".join(lines)
-
-
-def band_summary(found: BitBand) -> str:
-    """Return what is told of a band on a terminal."""
-    units, model = told_units(found.case), found.rational()
-    rig = bool(units.rate_name)
-    amplitude = sum(each.amplitude for each in found.responses) / len(found.responses)
-    unit = f", {units.response_name}" if rig else ""
-    lines = [
-        f"H over frequency at a swing of {amplitude:.3g}{unit}",
-        f"{'Hz' if rig else 'ω':>9} {'Re H':>9} {'Im H':>9} {'±':>7}",
-    ]
-    for each in found.responses:
-        place = each.frequency / units.time / (2.0 * math.pi if rig else 1.0)
-        value, error = each.value * units.response, each.error * units.response
-        lines.append(f"{place:9.4g} {value.real:9.4g} {value.imag:9.4g} {error:7.2g}")
-    growth = spectral_abscissa(found.system()) / units.time
-    counted = found.count_growing()
-    told = (
-        "cannot be told from the band" if counted is None else f"{counted}, counted with H itself"
-    )
-    return "\n".join(
-        [
-            *lines,
-            f"Rational model: {model.poles.size} poles, within {model.error * units.response:.2g}.",
-            f"Torsional loop with it: growth rate {growth:.4g}{' 1/s' if rig else ''}; growing "
-            f"roots: {told}.",
-        ]
-    )

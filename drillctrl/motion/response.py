@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.motion.record import Halves, halves, windowed
 from drillctrl.motion.turning import Led, Turned
@@ -119,6 +120,7 @@ def settling_time(case: Case) -> float:
     return float(np.clip(_SETTLING / max(slowest, 1e-9), _SHORTEST, _LONGEST))
 
 
+@checks_kinds
 def bit_response(
     where: Where,
     frequency: float,

@@ -13,9 +13,11 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import response_scale
+from drillctrl.motion.crossings import sign_changes
 from drillctrl.motion.orbit import AxialOrbit, axial_orbit
 from drillctrl.motion.response import FEWEST_PERIODS, TOLERANCE, BitResponse, bit_response
 from drillctrl.motion.torsion import TorsionalMode, ripple_of, torsional_modes
@@ -117,15 +119,11 @@ class ModeSwing:
     @property
     def crossings(self) -> tuple[Crossing, ...]:
         """Amplitudes at which it neither grows nor decays, those of no sure sign left out."""
-        sure = [each for each in self.at if each.sign]
-        found = []
-        for before, after in itertools.pairwise(sure):
-            if before.sign != after.sign:
-                low, high = before.amplitude, after.amplitude
-                a, b = before.root.real, after.root.real
-                kind = "swing" if before.sign > 0 else "kick"
-                found.append(Crossing(kind, low + (high - low) * a / (a - b), low, high))
-        return tuple(found)
+        found = sign_changes([each.amplitude for each in self.at], self.at)
+        return tuple(
+            Crossing("swing" if known.grows_below else "kick", known.place, known.low, known.high)
+            for known in found
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +180,7 @@ class DrillingMotion:
         )
 
 
+@checks_kinds
 def drilling_motion(
     where: Where,
     amplitudes: Sequence[float] = AMPLITUDES,
@@ -233,6 +232,7 @@ def _floor(case: Case, orbit: AxialOrbit, swings: tuple[ModeSwing, ...]) -> floa
     return float(np.ptp(speed)) / (2.0 * point.omega0)
 
 
+@checks_kinds
 def mode_at(
     where: Where, mode: TorsionalMode, amplitude: float, *, ripple: bool = True, **options: Any
 ) -> ModeAt:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -12,10 +11,12 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import changed_by
 from drillctrl.drilling.quantities import response_scale, si_scale
+from drillctrl.motion.crossings import sign_changes
 from drillctrl.motion.response import FEWEST_PERIODS
 from drillctrl.motion.swing import ModeAt, mode_at
 from drillctrl.motion.torsion import torsional_modes
@@ -113,15 +114,10 @@ class ModeAlong:
     @property
     def thresholds(self) -> tuple[Threshold, ...]:
         """Where it neither grows nor decays, by rising factor."""
-        sure = [(f, each) for f, each in zip(self.factors, self.at, strict=True) if each.sign]
-        found = []
-        for (low, before), (high, after) in itertools.pairwise(sure):
-            if before.sign != after.sign:
-                a, b = before.root.real, after.root.real
-                decays = "above" if before.sign > 0 else "below"
-                factor = low + (high - low) * a / (a - b)
-                found.append(Threshold(decays, float(factor), float(low), float(high)))
-        return tuple(found)
+        return tuple(
+            Threshold("above" if k.grows_below else "below", k.place, k.low, k.high)
+            for k in sign_changes(self.factors.tolist(), self.at)
+        )
 
     @property
     def _held(self) -> list[str]:
@@ -157,6 +153,7 @@ class ModeAlong:
         )
 
 
+@checks_kinds
 def torsional_threshold(
     where: Where,
     along: str = "speed",

@@ -9,6 +9,7 @@ import scipy
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 
 _ANGLES = ("angle", "angular_rate")
@@ -91,6 +92,7 @@ def torsional_states(where: Where) -> tuple[FloatArray, FloatArray, list[int]]:
     return arrays.A[np.ix_(places, places)], arrays.E[places, 1], places
 
 
+@checks_kinds
 def torsional_modes(where: Where, count: int = 1) -> tuple[TorsionalMode, ...]:
     """Return the slowest torsional modes of string and drive, nothing at the bit.
 

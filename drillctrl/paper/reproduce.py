@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import save_figure
 from drillctrl.base.files import write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.paper import controlled, uncontrolled
 from drillctrl.paper.agreement import Agreement, as_csv, as_json, as_markdown
@@ -52,6 +53,7 @@ def part_names(names: Sequence[str]) -> list[str]:
     return [name for name in PARTS if "all" in wanted or name in wanted]
 
 
+@checks_kinds
 def reproduce(
     names: Sequence[str] = ("all",),
     out: str | Path = "reproduction",

@@ -12,7 +12,8 @@ import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import crossings
 from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -62,7 +63,7 @@ class ParameterMargin:
     resolution: float
 
 
-@takes_system
+@checks_kinds
 def delay_margin(system: DelaySystem) -> DelayMargin:
     """Return by how much the delays may be wrong before a root reaches the axis.
 
@@ -111,6 +112,7 @@ def _nearest_factors(system: DelaySystem) -> Iterator[tuple[float, float]]:
         yield from ((factor, omega) for factor in (below, below + turn) if factor > 0.0)
 
 
+@checks_kinds
 def parameter_margin(
     loop_at: Callable[[float], DelaySystem],
     limit: float = 1.0,

@@ -14,7 +14,8 @@ import numpy as np
 import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import size_bound
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
@@ -48,7 +49,7 @@ class PeakGain:
     frequency: float
 
 
-@takes_system
+@checks_kinds
 def h_infinity_norm(system: DelaySystem) -> PeakGain:
     """Return the H∞ norm of G(s) = C Δ(s)⁻¹ B.
 

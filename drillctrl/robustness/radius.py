@@ -11,7 +11,8 @@ import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import AxisMinimum, line_minimum, weighted_minimum
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.roots import spectral_abscissa
@@ -57,7 +58,7 @@ def _weights(system: DelaySystem, weights: Sequence[float] | None) -> FloatArray
     return given
 
 
-@takes_system
+@checks_kinds
 def stability_radius(
     system: DelaySystem, weights: Sequence[float] | None = None, delay_weight: float = 0.0
 ) -> StabilityRadius:
@@ -95,7 +96,7 @@ def stability_radius(
     return StabilityRadius(least.value, least.lower_bound, least.frequency, least.factor)
 
 
-@takes_system
+@checks_kinds
 def real_stability_radius(
     system: DelaySystem, weights: Sequence[float] | None = None, points: int = 600
 ) -> StabilityRadius:
@@ -151,7 +152,7 @@ def real_stability_radius(
     return StabilityRadius(1.0 / best[0], -math.inf, best[1])
 
 
-@takes_system
+@checks_kinds
 def pseudospectral_abscissa(
     system: DelaySystem, epsilon: float, weights: Sequence[float] | None = None
 ) -> float:

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import feedback_lags, gain_matrices, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 
 # Change of phase and size of det Δ, and relative change of what is drawn, between neighbours.
@@ -24,7 +25,7 @@ _MAX_POINTS = 20_000
 _AT_ONCE = 100_000
 
 
-@takes_system
+@checks_kinds
 def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArray:
     """Return G(iω) = C Δ(iω)⁻¹ B, late inputs and outputs included, with no approximation.
 
@@ -48,7 +49,7 @@ def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArra
     return _by_frequency(turned * (system.C @ _responses(system, system.B, points)))
 
 
-@takes_system
+@checks_kinds
 def loop_transfer(
     system: DelaySystem,
     structure: FeedbackStructure,

@@ -78,6 +78,9 @@ class Controller:
         Later gains; times must rise. The delay is how long ago the delayed outputs are from
         then on; without one it is τ0 of the starting point, which is wrong where the rotary
         speed has changed.
+    back_calculation : mapping
+        State of the plant that is an integral of the law → 1/T: its rate is less by so much of
+        what the command is beyond its limit, so that it does not wind up there.
     plant : Plant, optional
         What the gains were designed for. `simulate` then refuses another one, unless told
         that it is meant.
@@ -101,6 +104,7 @@ class Controller:
     noise: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     schedule: tuple[ScheduleEntry | tuple[Any, ...], ...] = ()
+    back_calculation: Mapping[str, float] = field(default_factory=dict)
     plant: Plant | None = None
 
     def __post_init__(self) -> None:
@@ -132,10 +136,18 @@ class Controller:
             raise InputError("noise", dict(self.noise), "left out unless there is a period")
         for name, deviation in self.noise.items():
             checked_number(f"noise {name}", deviation, 0.0, 1e9)
+        for name, rate in self.back_calculation.items():
+            checked_number(f"back_calculation {name}", rate, 0.0, 1e9)
         for name, gains in zip(("K1", "K2"), self.gain_sets()[1:], strict=True):
             for gain in gains.ravel().tolist():
                 checked_number(name, gain, -_LARGEST_GAIN, _LARGEST_GAIN)
         self.delays(0.0)
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Names of the inputs that it drives."""
+        assert isinstance(self.feedback, FeedbackStructure)
+        return self.feedback.inputs
 
     def gain_sets(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return when each set of gains starts, and the gains of the structure.

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.plant import paper_plant
+from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.structure import structure_of
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
-from drillctrl.strings.drive_law import LAW, asking_plant
+from drillctrl.strings.drive_law import INTEGRAL, LAW, asking_plant, without_integral
+from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig
 
 _NONE = np.zeros((1, 2))
@@ -28,7 +33,7 @@ LAW_LOOP = FeedbackStructure(
 )  # fmt: skip
 
 
-@takes_rig_point
+@checks_kinds
 def drive_controller(
     where: RigPoint, control: DriveControl, *, period: float | None = None
 ) -> Controller:
@@ -54,7 +59,8 @@ def drive_controller(
     Notes
     -----
     The integral of the speed is the drive's angle behind its set point. It goes on while the
-    drive is at its limit, so that a drive that was stalled makes up for lost turns.
+    drive is at its limit, so that a drive that was stalled makes up for lost turns;
+    `law_controller` has one that does not.
     """
     rig, machine = where.rig, control.machine
     drive = rig.drive if isinstance(rig, StringRig) else None
@@ -84,13 +90,14 @@ def drive_controller(
     )
 
 
-@takes_rig_point
+@checks_kinds
 def law_controller(
     where: RigPoint,
     control: DriveControl,
     bit: BitRock | None = None,
     *,
     period: float | None = None,
+    tracking: float | None = None,
 ) -> tuple[Case, Controller]:
     """Return the plant that works out what any law asks of its drive, and the controller for it.
 
@@ -105,6 +112,9 @@ def law_controller(
         The bit–rock law, the paper's without it.
     period : float, optional
         Sampling period of the command, s; without it the law is continuous.
+    tracking : float, optional
+        Time in which the law's integral gives way at the torque limit, s; by default Kp/Ki.
+        ``math.inf`` lets it go on, so that the drive makes up for lost turns.
 
     Returns
     -------
@@ -116,6 +126,13 @@ def law_controller(
     InputError
         If the rig has no such drive, the law differentiates, or the drive has less torque than
         steady drilling takes.
+
+    Notes
+    -----
+    The integral does not wind up at the torque limit: its rate is less by what the command is
+    beyond the limit, over ``tracking`` (back-calculation; Åström and Hägglund, Advanced PID
+    Control, 2006, section 3.5). The lag of the drive plays no part in it. Poles of a law other
+    than the one at 0 are left to themselves.
     """
     rig, machine = where.rig, control.machine
     if not isinstance(rig, StringRig) or rig.drive is None:
@@ -133,7 +150,56 @@ def law_controller(
         measurement_delay=machine.delay / time,
         actuator_lag=machine.lag / time,
         period=None if period is None else period / time,
+        back_calculation=_giving_way(control, tracking, time),
     )
+
+
+@checks_kinds
+def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[str, float]]:
+    """Return the plant whose top drive takes any torque, and what surrounds a law of it.
+
+    Parameters
+    ----------
+    where : RigPoint
+        A string under a top drive with inertia, and where it drills.
+    bit : BitRock, optional
+        The bit–rock law, the paper's without it.
+
+    Returns
+    -------
+    Case, dict
+        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay and actuator_lag of
+        its machine as `Controller` takes them.
+
+    Raises
+    ------
+    InputError
+        If the rig has no such drive, or it has less torque than steady drilling takes.
+    """
+    rig = where.rig
+    if not isinstance(rig, StringRig) or rig.drive is None:
+        raise InputError("rig", type(rig).__name__, "one with a string and a top drive")
+    machine = rig.drive
+    drive = TopDrive(inertia_ratio=machine.inertia / rig.inertia)
+    blocks = (*rig.hoist(), drive)
+    case = as_case(where, paper_plant(bit, PipeString(rig.string), blocks=blocks))
+    limit = _spare_torque(case, machine, rig.torsional_stiffness)
+    around = {
+        "measurement_delay": machine.delay / rig.time_scale,
+        "actuator_lag": machine.lag / rig.time_scale,
+    }
+    return case, around if limit is None else {**around, "limit": limit}
+
+
+def _giving_way(control: DriveControl, tracking: float | None, time: float) -> dict[str, float]:
+    """Return how fast the law's integral gives way at the torque limit, dimensionless."""
+    integral, rest = without_integral(control.speed)
+    if not integral or control.machine.torque_limit is None or tracking == math.inf:
+        return {}
+    if tracking is None:
+        proportional = rest.numerator[-1] / rest.denominator[-1]
+        tracking = proportional / integral if proportional * integral > 0.0 else 1.0
+    return {INTEGRAL: time / checked_number("tracking", tracking, 0.0, 1e6, open_low=True)}
 
 
 def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:

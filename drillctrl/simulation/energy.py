@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
 from drillctrl.simulation.result import Simulation
 
@@ -37,6 +38,7 @@ class BandEnergy:
         return self.axial + self.torsional
 
 
+@checks_kinds
 def band_energy(
     run: Simulation, rig: Rig, low: float = 0.1, high: float = 10.0, share: float = 0.25
 ) -> BandEnergy:

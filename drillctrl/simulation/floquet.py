@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.orbits import limit_cycle
 from drillctrl.simulation.past import Past
@@ -57,6 +58,7 @@ class Floquet:
         return float(abs(others).max()) if others.size else None
 
 
+@checks_kinds
 def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: int = 0) -> Floquet:
     """Return the largest Floquet multipliers of the periodic motion that a run tends to.
 

@@ -15,6 +15,7 @@ from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.past import Past
+from drillctrl.simulation.pivots import follow_pivots
 from drillctrl.simulation.scenario import STOOD, Scenario
 from drillctrl.simulation.structure import Structure
 
@@ -95,7 +96,10 @@ def settings_for(
             reach = past and not current
             ages = controller.measurement_delay + ages if reach else np.zeros_like(ages)
         schedule = np.column_stack([times, ages])
-    index, value = _rows(structure, linear)
+    rows = _rows(structure, controller, linear)
+    pivots = follow_pivots(rows, structure.state_names)
+    whole[data.PIVOT : data.ROWS] = [*pivots, *[-1] * (data.PIVOTS - len(pivots))]
+    index, value = _entries(rows)
     whole[data.FED] = data.ROWS + index.size
     return data.Settings(
         bit=structure.bit,
@@ -110,22 +114,32 @@ def settings_for(
     )
 
 
-def _rows(structure: Structure, linear: bool) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Return what `Settings.whole` has from ROWS on, and `Settings.value`."""
+def _rows(structure: Structure, controller: Controller | None, linear: bool) -> FloatArray:
+    """Return the matrix of `Settings`, (n + p + 1, `vector_length`)."""
     string = structure.arrays
     n, m = string.B.shape
     p = len(structure.output_names)
     rows = np.zeros((n + p + 1, data.vector_length(n, m)))
     inputs, top, load = n + 2 * m, n + 3 * m, n + 3 * m + 4
     rows[:n, :n], rows[:n, inputs:top], rows[:n, top:load] = string.A, string.B, string.T
-    rows[:n, load:] = string.E
+    rows[:n, load : load + 2] = string.E
     rows[n : n + p, :n], rows[n : n + p, top:load] = string.C, -string.R
     if linear:
         rows[:n, :n], rows[:n, top:load] = string.linear, string.linear_delayed
-        rows[:n, load:] = rows[n : n + p, top:load] = 0.0
+        rows[:n, load : load + 2] = rows[n : n + p, top:load] = 0.0
         rows[-1, :4], rows[-1, top:load] = string.depth[:4], string.depth[4:8]
+    if controller is not None:
+        for state, rate in controller.back_calculation.items():
+            for name in controller.driven:
+                beyond = load + 2 + structure.input_names.index(name)
+                rows[structure.state_names.index(state), beyond] = -rate
+    return rows
+
+
+def _entries(rows: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Return what `Settings.whole` has from ROWS on, and `Settings.value`."""
     place, column = np.nonzero(rows)
-    count = n + p + 2
+    count = len(rows) + 1
     start = data.ROWS + count
     index = np.concatenate([start + np.searchsorted(place, np.arange(count)), column])
     return index.astype(np.int64), np.concatenate([np.zeros(start), rows[place, column]])

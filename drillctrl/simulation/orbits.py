@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
@@ -47,6 +48,7 @@ class LimitCycle:
     returns: int
 
 
+@checks_kinds
 def limit_cycle(run: Simulation, since: float = 0.0) -> LimitCycle | None:
     """Return the periodic motion that a run tends to, or None if its returns do not close.
 
@@ -119,6 +121,7 @@ class Separation:
     distance: FloatArray
 
 
+@checks_kinds
 def separation(
     point: OperatingPoint,
     controller: Controller | None = None,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drillctrl.drilling.hoist import HOOK
 from drillctrl.simulation.bounds import BEYOND, rate_scales
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
@@ -129,13 +130,20 @@ def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> 
         return Outcome.STALLS
     # What the feed pressed into the string before counts too, though the bit keeps up by now.
     pressed = loads(run).weight_ratio
-    if fed is not None and (fed < _KEEPS_UP or (pressed is not None and pressed > _PRESSED)):
+    # A string that is fed by its weight, or hangs on a constant one, has no feed to keep up with.
+    slow = fed is not None and fed < _KEEPS_UP and not _fed_by_weight(run)
+    if fed is not None and (slow or (pressed is not None and pressed > _PRESSED)):
         return Outcome.LATE
     if stuck > 0.0:
         return Outcome.STICK_SLIP
     if _settles(run, tail):
         return Outcome.SETTLES
     return Outcome.ORBIT if bool(tail.contact.all()) else Outcome.BOUNCES
+
+
+def _fed_by_weight(run: Simulation) -> bool:
+    """Whether the weight says how fast the top end goes down."""
+    return run.point.eta == 0.0 or f"d{HOOK}" in run.state_names
 
 
 def _settles(run: Simulation, tail: Motion) -> bool:

@@ -49,6 +49,8 @@ class Simulation(Trace):
         Where the run was of a `RigPoint`.
     """
 
+    made_by = "simulate returns"
+
     controller: Controller | None
     scenario: Scenario
     backwards: str

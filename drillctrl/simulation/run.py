@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.advance import finished, go_on
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, resized, settings_for
+from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.status import Status
 from drillctrl.simulation.structure import Structure, structure_of
 
 MODELS = ("nonlinear", "linear")
 CUTTINGS = ("multiple", "single")
 BACKWARDS = ("rest", "stop")
 LONGEST = 1e6
-TRIES = 400_000
 
 
 class Interrupted(KeyboardInterrupt):
@@ -96,9 +95,13 @@ def checked_run(
     check_start(point, structure, scenario, linear)
     if controller is not None:
         controller.gains(structure.input_names, structure.output_names)
+        for name in controller.back_calculation:
+            if name not in structure.state_names:
+                raise InputError("back_calculation", name, "a state of the plant")
     return scenario, duration, rtol, atol, max_steps
 
 
+@checks_kinds
 def simulate(
     where: Where,
     controller: Controller | None = None,
@@ -115,6 +118,7 @@ def simulate(
     max_steps: int = 1_000_000,
     time_limit: float = math.inf,
     other_plant: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Simulation:
     """Simulate the drill string with state-dependent delay, dry friction and loss of contact.
 
@@ -153,6 +157,8 @@ def simulate(
         several times a second.
     other_plant : bool
         Whether the plant may be another than the one that the controller names.
+    progress : callable, optional
+        Called with the time that was reached, several times a second.
 
     Returns
     -------
@@ -215,39 +221,22 @@ def simulate(
     standing = begin(
         point, structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1)
     )
-    march = kernel("march", structure.physics)
-    status = {
-        data.DONE: Status.DONE,
-        data.COLLAPSE: Status.COLLAPSE,
-        data.REVERSED: Status.REVERSED,
-        data.NOT_FINITE: Status.NOT_FINITE,
-        data.DIVERGED: Status.DIVERGED,
-        data.PAUSED: Status.TIME_LIMIT,
-        data.INTERRUPTED: Status.INTERRUPTED,
-    }
     started = time.perf_counter()
-    # Few enough that an interrupt is heard soon.
-    tries = TRIES // (len(structure.state_names) + 16)
-    try:
-        while True:
-            outcome = march.march(*standing[:-1], duration, float(max_step), tries)
-            used = int(standing.ints[march.STEPS])
-            if outcome == data.PAUSED:
-                if time.perf_counter() - started <= time_limit:
-                    continue
-                break
-            if outcome != data.MORE_ROOM or used - standing.first >= max_steps:
-                break
-            room = min(2 * standing.history.real.shape[0], max_steps + 1 + standing.first)
-            standing = standing._replace(history=resized(standing.history, room, used))
-    except KeyboardInterrupt:
-        # Heard between two calls of the march, which leave all in place.
-        outcome, used = data.INTERRUPTED, int(standing.ints[march.STEPS])
+    standing, outcome = go_on(
+        standing,
+        structure,
+        duration,
+        float(max_step),
+        max_steps,
+        started + time_limit,
+        progress,
+    )
     elapsed = time.perf_counter() - started
-    # A view: what was never written to takes no memory.
-    history = data.History(*(array[:used] for array in standing.history))
-    run = Simulation(
+    run = finished(
+        standing,
+        outcome,
         case=case,
+        structure=structure,
         controller=controller,
         scenario=scenario,
         model=model,
@@ -256,15 +245,7 @@ def simulate(
         duration=duration,
         rtol=rtol,
         atol=atol,
-        status=status.get(outcome, Status.STEP_LIMIT),
-        rejected=int(standing.ints[march.REJECTED]),
-        evaluations=int(standing.ints[march.EVALUATIONS]),
         elapsed_seconds=elapsed,
-        structure=structure,
-        settings=settings,
-        history=history,
-        first=standing.first,
-        rig=case.rig,
     )
     if outcome == data.INTERRUPTED:
         raise Interrupted(run)

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.friction import Stribeck
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
@@ -72,7 +73,7 @@ class Slowing:
         }
 
 
-@takes_rig_point
+@checks_kinds
 def slow_down(
     where: RigPoint,
     control: DriveControl,

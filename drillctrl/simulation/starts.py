@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
@@ -192,6 +193,7 @@ def start_runs(
         yield StartRun(name, figures(run), run)
 
 
+@checks_kinds
 def simulate_starts(
     where: Where,
     controller: Controller | None = None,

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.reduced import ReducedLoops, reduced
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
 
@@ -72,7 +73,7 @@ class Followed:
     slope: ComplexArray
 
 
-@takes_system
+@checks_kinds
 def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """Count the roots with Re s > ``line``.
 

@@ -17,7 +17,8 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_number
 from drillctrl.base.extras import required
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 
 PRECISION = 106
 _TERMS = 6
@@ -52,7 +53,7 @@ class Proof:
     elapsed_seconds: float
 
 
-@takes_system
+@checks_kinds
 def prove_count(system: DelaySystem, line: float, most: int = _MAX_SEGMENTS) -> Proof:
     """Prove how many characteristic roots have Re s > ``line``.
 

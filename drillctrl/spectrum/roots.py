@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError, UndecidedError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.reduced import reduced
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.climb import MOST_ROOTS, Climb
 from drillctrl.spectrum.count import count_right_of
@@ -158,7 +159,7 @@ def _first_places(system: DelaySystem) -> ComplexArray:
     return np.concatenate(places).astype(complex)
 
 
-@takes_system
+@checks_kinds
 def spectral_abscissa(system: DelaySystem) -> float:
     """Return the largest real part of the characteristic roots.
 
@@ -181,7 +182,7 @@ def spectral_abscissa(system: DelaySystem) -> float:
     return max(root.rightmost for root in resolve(system, s, done)) / unit
 
 
-@takes_system
+@checks_kinds
 def dominant_roots(system: DelaySystem) -> tuple[Root, ...]:
     """Return the rightmost characteristic roots with imag ≥ 0, rightmost first.
 
@@ -213,7 +214,7 @@ def known_roots(system: DelaySystem, most: int | None = None) -> tuple[tuple[Roo
     return _slowed(resolve(system, s, done), unit), floor / unit
 
 
-@takes_system
+@checks_kinds
 def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ...]:
     """Return all characteristic roots with real part ≥ ``right_of``, rightmost first.
 

@@ -18,7 +18,8 @@ import scipy.sparse.linalg
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer
-from drillctrl.delay.system import DelaySystem, low_rank_factors, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem, low_rank_factors
 from drillctrl.spectrum.characteristic import magnitude_bound
 
 MAX_INTERVALS = 4000
@@ -134,7 +135,7 @@ def default_intervals(system: DelaySystem, order: int) -> int:
     return min(_DEFAULT_LIMIT, max(least, math.ceil(dense * reach)))
 
 
-@takes_system
+@checks_kinds
 def semidiscretize(system: DelaySystem, m: int | None = None, order: int = 1) -> SemiDiscretization:
     """Semi-discretise a delay system.
 

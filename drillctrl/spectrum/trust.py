@@ -10,7 +10,8 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.delay.system import DelaySystem, takes_system
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.spectrum.semidiscretization import (
     MAX_INTERVALS,
@@ -50,7 +51,7 @@ class SpectrumComparison:
         return float(self.approximate.real.max() - self.exact.real.max())
 
 
-@takes_system
+@checks_kinds
 def compare_spectra(
     system: DelaySystem, m: int | None = None, order: int = 0, depth: float | None = None
 ) -> SpectrumComparison:
@@ -90,7 +91,7 @@ def compare_spectra(
     return SpectrumComparison(scheme, exact, np.array(matched))
 
 
-@takes_system
+@checks_kinds
 def intervals_for(system: DelaySystem, tolerance: float, order: int = 0) -> int:
     """Choose m so that the dominant roots are right to a tolerance.
 

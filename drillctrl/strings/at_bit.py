@@ -10,6 +10,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.hoist import Hoist
 from drillctrl.drilling.plant import Plant
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveControl
@@ -32,10 +33,13 @@ class StringAtBit:
         The string.
     control : DriveControl or None
         Of its drive; None where the speed is imposed.
+    units : DrillString or None
+        Whose lumped equivalent makes the units of dimensionless points; None for its own.
     """
 
     string: DrillString
     control: DriveControl | None = None
+    units: DrillString | None = None
 
     def receptances(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return displacement per force, m/N, and rotation per torque, rad/(N m), (...).
@@ -69,8 +73,9 @@ class StringAtBit:
 
     @property
     def time_scale(self) -> float:
-        """Seconds to the unit of time of dimensionless points, √(I/Kt) of the lumped string."""
-        torsional = lumped(self.string, self.string.torsion)
+        """Seconds to the unit of time of dimensionless points, √(I/Kt) of a lumped string."""
+        unit = self.units or self.string
+        torsional = lumped(unit, unit.torsion)
         return float(np.sqrt(torsional.mass / torsional.stiffness))
 
     @functools.cached_property
@@ -83,8 +88,13 @@ def _not_zero(s: ComplexArray) -> ComplexArray:
     return np.asarray(np.where(s == 0.0, _NEARLY_NOTHING, s))
 
 
+def fed_by_weight(plant: Plant) -> bool:
+    """Whether the upper end hangs on a hook of its own, of which the exact string knows nothing."""
+    return any(isinstance(block, Hoist) for block in plant.blocks)
+
+
 def string_at_bit(plant: Plant) -> StringAtBit | None:
-    """Return the exact string of a plant; None if the plant is not a bit on a string of pipe.
+    """Return the exact string of a plant; None if the plant is none of pipe under imposed feed.
 
     Raises
     ------
@@ -98,10 +108,13 @@ def string_at_bit(plant: Plant) -> StringAtBit | None:
     if drives and not laws:
         wanted = "under a law that holds its speed, such as --structure soft-torque"
         raise InputError("top drive", "free to turn", wanted)
-    return _at_bit(plant.string.string, laws[0].control if laws else None)
+    if fed_by_weight(plant):
+        return None
+    hung = plant.string
+    return _at_bit(hung.string, laws[0].control if laws else None, hung.units)
 
 
 @functools.lru_cache(maxsize=64)
-def _at_bit(string: DrillString, control: DriveControl | None) -> StringAtBit:
+def _at_bit(string: DrillString, control: DriveControl | None, units: DrillString) -> StringAtBit:
     """Return the same object for equal strings, which keeps what it has counted."""
-    return StringAtBit(string, control)
+    return StringAtBit(string, control, units)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.section import JOINT_LENGTH, ToolJoint
 
 INCH = 0.0254
@@ -58,6 +59,7 @@ def pipe_names() -> tuple[str, ...]:
     return (*_PIPE, *_HEAVY)
 
 
+@checks_kinds
 def pipe(name: str) -> Pipe:
     """Return pipe by its name.
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.case import Case, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
@@ -14,6 +15,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.at_bit import string_at_bit
 from drillctrl.strings.drill_string import DEEPEST, HEAVIEST_MUD, DrillString
 from drillctrl.strings.drive_law import driven_plant
+from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig, lumped_values
 
 CHANGES = ("depth", "mud")
@@ -38,6 +40,7 @@ def permitted_range(string: DrillString, name: str) -> tuple[float, float]:
     return (string.shallowest, DEEPEST) if name == "depth" else (0.0, HEAVIEST_MUD)
 
 
+@checks_kinds
 def changed_rig(rig: Rig, depth: float | None = None, mud: float | None = None) -> StringRig:
     """Return a rig that has drilled to another depth, or with another mud.
 
@@ -55,13 +58,8 @@ def changed_rig(rig: Rig, depth: float | None = None, mud: float | None = None) 
     InputError
         If the rig has no string, or a value is out of range.
     """
-    string = string_of(rig)
+    string = _at(string_of(rig), depth, mud)
     assert isinstance(rig, StringRig)
-    if depth is not None:
-        string = string.at_depth(depth)
-    if mud is not None:
-        checked_number("mud", mud, *permitted_range(string, "mud"))
-        string = replace(string, mud_density=mud)
     values: dict[str, Any] = {**lumped_values(string)}
     return replace(rig, string=string, **values)
 
@@ -76,6 +74,46 @@ def changed_case(case: Case, point: RigPoint) -> Case:
     """
     plant, _ = case.physics("another string")
     return as_case(point, changed_plant(plant, point.rig))
+
+
+def _at(string: DrillString, depth: float | None, mud: float | None) -> DrillString:
+    if depth is not None:
+        string = string.at_depth(depth)
+    if mud is not None:
+        checked_number("mud", mud, *permitted_range(string, "mud"))
+        string = replace(string, mud_density=mud)
+    return string
+
+
+def restrung(plant: Plant, depth: float | None = None, mud: float | None = None) -> Plant:
+    """Return a plant that hangs on its string at another depth, or in another mud.
+
+    Its units stay those of the string as it was, so that the numbers of points, gains and drives
+    mean the same.
+
+    Parameters
+    ----------
+    plant : Plant
+        Whose string is one of pipe.
+    depth, mud : float, optional
+        As of `changed_rig`.
+
+    Raises
+    ------
+    InputError
+        If the plant has no such string, or a value is out of range.
+    """
+    hung = plant.string
+    if not isinstance(hung, PipeString):
+        wanted = "a string of sections: only that has a depth and mud"
+        raise InputError("string", type(hung).__name__, wanted)
+    string = _at(hung.string, depth, mud)
+    if string == hung.string:
+        return plant
+    usual = hung.frequencies == PipeString(hung.string).frequencies
+    torsional, axial = (None, None) if usual else hung.frequencies
+    other = PipeString(string, torsional, axial, hung.tolerance, hung.units)
+    return replace(plant, string=other)
 
 
 def changed_plant(plant: Plant, rig: Rig) -> Plant:

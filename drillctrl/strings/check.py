@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import STANDARD_GRAVITY, Rig
 from drillctrl.strings.elements import elements, free_modes
 from drillctrl.strings.line import Line
@@ -117,6 +118,7 @@ def _sections(rig: Rig) -> tuple[Any, ...]:
     return rig.string.sections if isinstance(rig, StringRig) else ()
 
 
+@checks_kinds
 def check_rig(rig: Rig) -> RigCheck:
     """Return what is understood of a rig.
 

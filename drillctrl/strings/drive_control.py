@@ -149,6 +149,8 @@ class DriveControl:
         type, and high frequencies would decide.
     """
 
+    made_by = "drive_control makes of a rig"
+
     name: str
     machine: DriveMachine
     speed: Transfer

@@ -19,12 +19,13 @@ import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import HIGHEST, drive_is_stable, lowest_impedance, mode_bands
 from drillctrl.synthesis.descent import bfgs
-from drillctrl.synthesis.search import spread_points
+from drillctrl.synthesis.spread import spread_points
 
 MODES = 4
 # Speed gains in units of ζ, torque gains as such; corners in units of the speed that scales s.
@@ -321,6 +322,7 @@ def _drive(machine: DriveMachine, pipe: float, rate: float, s: ComplexArray) -> 
     return _Drive(machine.inertia * s, path * speed, path * torque, s / rate)
 
 
+@checks_kinds
 def dynamic_drive_control(
     line: Line,
     machine: DriveMachine,

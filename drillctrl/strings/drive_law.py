@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import Coefficients
@@ -21,13 +22,15 @@ from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig
 
-LAW, MEASURED = "law", "measured_torque"
+LAW, MEASURED, INTEGRAL = "law", "measured_torque", "law_integral"
 
 
 class DriveLaw(Block):
     """What a law asks of its drive, which does it; the torque is an output, ``law``.
 
-    The integral of speed is the top's angle itself; all else of A and B has states of its own.
+    Where the drive does it, the integral of speed is the top's angle itself; where the law is an
+    output alone, it is a state of its own, ``law_integral``, which a controller can keep from
+    winding up at a limit. All else of A and B has states of its own.
 
     Parameters
     ----------
@@ -73,12 +76,17 @@ class DriveLaw(Block):
             made = self._with_pipe_torque(made, c)
         suffix = "_filtered" if control.machine.encoder else ""
         integral, rest = without_integral(control.speed)
+        asked, reference = ca.SX(1, len(made.states)), ca.SX(1, 4)
         # Output, gain of that output itself, transfer function of it.
-        terms = [(f"phi{suffix}", -integral / torque, Transfer())]
+        terms: list[tuple[str, float, Transfer]] = []
+        if self.__dict__["acts"]:
+            terms.append((f"phi{suffix}", -integral / torque, Transfer()))
+        elif integral:
+            made = _integrating(made, f"dphi{suffix}", -integral / torque)
+            asked = ca.horzcat(asked, ca.SX(1))
         terms.append((f"dphi{suffix}", 0.0, _scaled(rest, time, -1.0 / (torque * time))))
         if control.torque:
             terms.append((MEASURED, 0.0, _scaled(control.torque, time, 1.0)))
-        asked, reference = ca.SX(1, len(made.states)), ca.SX(1, 4)
         for name, gain, law in terms:
             place = made.output_names.index(name)
             a, b, row, through = companion(law)
@@ -124,6 +132,14 @@ class DriveLaw(Block):
         row = ca.SX(1, len(grown.states))
         row[0, -1] = 1
         return replace(grown, A=a, B=b, E=e).with_output(signal, row, ca.SX(1, 4))
+
+
+def _integrating(made: Realisation, name: str, gain: float) -> Realisation:
+    """Return the equations with the integral of an output, times a gain, as a state."""
+    place = made.output_names.index(name)
+    state = [Signal(INTEGRAL, "torque")]
+    row = made.C[place, :], made.R[place, :]
+    return _with_states(made, state, np.zeros((1, 1)), np.array([gain]), *row)
 
 
 def _with_states(
@@ -191,6 +207,7 @@ def companion(law: Transfer) -> tuple[FloatArray, FloatArray, FloatArray, float]
     return a, b, (above - through * below)[:0:-1], through
 
 
+@checks_kinds
 def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = None) -> Plant:
     """Return the plant of a rig that is turned by a drive under a law.
 
@@ -210,7 +227,7 @@ def driven_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = No
     """
     machine, time = control.machine, rig.time_scale
     ratio = machine.inertia / rig.inertia
-    blocks: list[Block] = [TopDrive(inertia_ratio=ratio)]
+    blocks: list[Block] = [*rig.hoist(), TopDrive(inertia_ratio=ratio)]
     if machine.lag:
         blocks.append(Lagging("drive", machine.lag / time))
     if machine.delay:
@@ -230,7 +247,7 @@ def asking_plant(rig: StringRig, control: DriveControl, bit: BitRock | None = No
     machine, time = control.machine, rig.time_scale
     ratio = machine.inertia / rig.inertia
     measured = replace(control, machine=replace(machine, lag=0.0, delay=0.0))
-    blocks: list[Block] = [TopDrive(inertia_ratio=ratio)]
+    blocks: list[Block] = [*rig.hoist(), TopDrive(inertia_ratio=ratio)]
     if machine.encoder:
         blocks += [Filtered(name, machine.encoder / time) for name in ("phi", "dphi")]
     blocks.append(DriveLaw(measured, time, rig.torsional_stiffness, ratio, acts=False))

@@ -18,6 +18,7 @@ import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.elements import elements, free_modes
 from drillctrl.strings.line import Line
@@ -33,6 +34,7 @@ _SOONEST = 2e-3
 _MOST_MODES = 3
 
 
+@checks_kinds
 def observer_drive_control(line: Line, machine: DriveMachine, modes: int = 1) -> DriveControl:
     """Return an observer of the first modes of torsion with feedback of what it estimates.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 from drillctrl.strings.elements import elements, free_modes
@@ -22,6 +23,7 @@ _INNER_FREQUENCY, _INNER_PHASE = 3.0, 0.1
 RULES = ("stiff", "soft-torque", "soft-torque-matched", "soft-torque-fastest", "z-torque")
 
 
+@checks_kinds
 def pi_control(
     machine: DriveMachine,
     proportional: float,
@@ -56,6 +58,7 @@ def pi_control(
     return DriveControl(name, machine, law)
 
 
+@checks_kinds
 def stiff_control(machine: DriveMachine, pipe: float) -> DriveControl:
     """Return a drive that keeps its speed whatever the string does: Kp = 50 ζ, Ki = 5 J.
 
@@ -69,6 +72,7 @@ def stiff_control(machine: DriveMachine, pipe: float) -> DriveControl:
     return pi_control(machine, 50.0 * pipe, 5.0 * machine.inertia, name="stiff")
 
 
+@checks_kinds
 def soft_torque_control(
     machine: DriveMachine,
     pipe: float,
@@ -99,6 +103,7 @@ def soft_torque_control(
     return pi_control(machine, times * pipe, integral, compensated, name)
 
 
+@checks_kinds
 def fastest_control(machine: DriveMachine, stiffness: float, inertia: float) -> DriveControl:
     """Return the PI control under which a lumped string decays fastest, a double complex pair.
 
@@ -114,6 +119,7 @@ def fastest_control(machine: DriveMachine, stiffness: float, inertia: float) -> 
     return pi_control(machine, proportional, integral, name="soft-torque-fastest")
 
 
+@checks_kinds
 def z_torque_control(
     machine: DriveMachine, pipe: float, times: float = 4.0, high_pass: float = 0.01
 ) -> DriveControl:
@@ -146,6 +152,7 @@ def z_torque_control(
     return DriveControl("z-torque", machine, law, torque)
 
 
+@checks_kinds
 def transfer_control(machine: DriveMachine, law: Any, name: str = "own") -> DriveControl:
     """Return control by a transfer function of the user's own, from speed to braking torque.
 
@@ -185,6 +192,7 @@ def first_frequency(string: DrillString) -> float:
     return float(free_modes(elements(string.torsion), 1).frequencies[0])
 
 
+@checks_kinds
 def rule_control(name: str, machine: DriveMachine, string: DrillString) -> DriveControl:
     """Return the law of a rule.
 

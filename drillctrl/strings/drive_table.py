@@ -12,6 +12,7 @@ import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import BLUE, GREY, ORANGE, new_figure
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none
 from drillctrl.drilling.rig import Rig
@@ -150,6 +151,7 @@ class DriveTable:
         return figure
 
 
+@checks_kinds
 def drive_table(rig: Rig, structure: str, depths: Sequence[float]) -> DriveTable:
     """Tune or design the law of a top drive at several depths.
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.rig import Rig
@@ -102,6 +103,7 @@ class DriveComparison:
         return plot_drives(curves, self.rig.string.torsion.wave_impedance, title)
 
 
+@checks_kinds
 def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> DriveControl:
     """Return the law of a name for the drive of a rig, designed if it is a dynamic one.
 
@@ -172,6 +174,7 @@ def machine_of(rig: Rig) -> DriveMachine:
     return rig.drive
 
 
+@checks_kinds
 def compare_drives(
     rig: Rig,
     structures: Sequence[str | DriveControl],

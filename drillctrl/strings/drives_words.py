@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from drillctrl.base import units
 from drillctrl.base.language import SI, Language
 from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.drive_law import without_integral
@@ -94,7 +93,7 @@ def _speed(speed: float) -> str:
 
 
 def _rpm(speed: float) -> float:
-    return units.from_si(speed, units.ROTARY_SPEED, "rpm")
+    return speed * 30.0 / math.pi
 
 
 def _ordinal(number: int) -> str:

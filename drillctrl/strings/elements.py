@@ -23,6 +23,8 @@ _FINER = 4.0
 # to it, of this share of its mass, damps it by a sixth of critical and, unlike a dashpot, leaves
 # alone what is slow: its loss falls with the fifth power of frequency.
 _ABSORBER, _ABSORBER_DAMPING = 0.5, 0.5
+# Share of its size up to which a coupling of modes, and of what is left of them, is rounding.
+_COUPLED = 1e-9
 # Elements may take this share of a tolerance.
 _ELEMENTS_SHARE = 0.3
 _SAMPLES, _FEWER = 400, 4
@@ -201,17 +203,29 @@ def reduced(chain: Chain, modes: Modes, count: int) -> Reduced:
     loads[0, 0], loads[-1, 1] = 1.0, -chain.beside[2, -1]
     static, top = scipy.linalg.solveh_banded(bands, loads).T
     rest = static - kept @ (kept[0] / squares)
-    # The bit's own displacement takes the place of how much of the static rest there is.
+    # It is what is left of much: modes are taken out again, of which rounding left some.
+    rest -= kept @ (kept.T @ chain.product(0, np.append(rest, 0.0)[:, None])[:-1, 0])
     shapes = np.zeros((size, 2 + count))
-    shapes[:-1, 0] = rest / rest[0]
-    shapes[:-1, 1:-1] = kept - np.outer(shapes[:-1, 0], kept[0])
-    shapes[:-1, -1] = top - shapes[:-1, 0] * top[0]
+    shapes[:-1, 0], shapes[:-1, 1:-1], shapes[:-1, -1] = rest / rest[0], kept, top
     shapes[-1, -1] = 1.0
     projected = [shapes.T @ chain.product(which, shapes) for which in range(3)]
+    # The bit's own displacement takes the place of how much of the static rest there is.
     amount = np.concatenate([[1.0], -kept[0], [-top[0]]])
-    matrices = _with_absorber([0.5 * (matrix + matrix.T) for matrix in projected], amount)
+    change = np.eye(2 + count)
+    change[0] = amount
+    shapes = shapes @ change
+    changed = [change.T @ _cleaned(part) @ change for part in projected]
+    matrices = _with_absorber([0.5 * (part + part.T) for part in changed], amount)
     force = -chain.beside[2, -1] * (shapes[-1] - shapes[-2])
     return Reduced(matrices, np.insert(shapes, -1, 0.0, axis=1), np.insert(force, -1, 0.0))
+
+
+def _cleaned(matrix: FloatArray) -> FloatArray:
+    """Return a symmetric matrix of rest, modes and top without what rounding couples."""
+    whole = 0.5 * (matrix + matrix.T)
+    size = np.sqrt(np.abs(np.diag(whole)))
+    whole[abs(whole) <= _COUPLED * np.outer(size, size)] = 0.0
+    return np.asarray(whole)
 
 
 def _with_absorber(plain: list[FloatArray], amount: FloatArray) -> Matrices:

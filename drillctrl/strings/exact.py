@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.drilling.linear import bit_response
 from drillctrl.strings.at_bit import StringAtBit, string_at_bit
@@ -47,6 +48,8 @@ class ExactLoop:
         the axis but ``poles``; None where its speed is imposed.
     poles : int
         Poles of these right of the axis.
+    units : DrillString or None
+        Whose lumped equivalent makes the units; None for the string's own.
     """
 
     string: DrillString
@@ -55,11 +58,13 @@ class ExactLoop:
     delay: float
     top: TopEnds | None = None
     poles: int = 0
+    units: DrillString | None = None
 
     @property
     def rate(self) -> float:
         """Seconds to units of time: √(Kt/I)."""
-        torsional = lumped(self.string, self.string.torsion)
+        unit = self.units or self.string
+        torsional = lumped(unit, unit.torsion)
         return float(np.sqrt(torsional.stiffness / torsional.mass))
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
@@ -77,8 +82,8 @@ class ExactLoop:
         of it is over.
         """
         at = np.asarray(s, dtype=complex)
-        axial = lumped(self.string, self.string.tension)
-        torsional = lumped(self.string, self.string.torsion)
+        unit = self.units or self.string
+        axial, torsional = lumped(unit, unit.tension), lumped(unit, unit.torsion)
         rate = self.rate
         physical = np.asarray(at * rate, dtype=complex)
         x, weight, growth_x = self.string.tension.at_bit(physical)
@@ -139,6 +144,7 @@ class ExactLoop:
         raise InputError("near", near, "close to a root")
 
 
+@checks_kinds
 def exact_loop(where: Where, top: TopStiffness | None = None) -> ExactLoop:
     """Return the exact loop of a case whose string is one of pipe.
 
@@ -162,7 +168,9 @@ def exact_loop(where: Where, top: TopStiffness | None = None) -> ExactLoop:
     now, load, then, delay = (v[0] for v in bit_response(plant)(case.parameter_vector[None]))
     string, then = plant.string.string, load @ then
     if top is not None:
-        return ExactLoop(string, now, then, float(delay[0, 0]), _with_stiffness(top))
+        return ExactLoop(
+            string, now, then, float(delay[0, 0]), _with_stiffness(top), 0, plant.string.units
+        )
     known = string_at_bit(plant)
     if known is None:
         raise InputError("plant", "with parts of your own", "a bit on a string under its drive")
@@ -172,8 +180,9 @@ def exact_loop(where: Where, top: TopStiffness | None = None) -> ExactLoop:
 def known_loop(known: StringAtBit, now: FloatArray, then: FloatArray, delay: float) -> ExactLoop:
     """Return the exact loop of a bit on a string under its drive; see `ExactLoop`."""
     if known.control is None:
-        return ExactLoop(known.string, now, then, delay)
-    return ExactLoop(known.string, now, then, delay, known.top, drive_poles(known.control))
+        return ExactLoop(known.string, now, then, delay, units=known.units)
+    poles = drive_poles(known.control)
+    return ExactLoop(known.string, now, then, delay, known.top, poles, known.units)
 
 
 def _with_stiffness(top: TopStiffness) -> TopEnds:

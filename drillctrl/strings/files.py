@@ -13,6 +13,7 @@ from typing import Any
 from drillctrl.base import units
 from drillctrl.base.errors import InputError, blamed_on, checked_integer, checked_number
 from drillctrl.base.files import check_regular
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.units import Dimension
 from drillctrl.drilling.rig import PRESETS as LUMPED_PRESETS
 from drillctrl.drilling.rig import Rig, read_toml, rig_from_mapping, table1
@@ -21,9 +22,12 @@ from drillctrl.strings.drill_string import Damping, DrillString
 from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.presets import PRESETS as STRING_PRESETS
 from drillctrl.strings.presets import string_preset
-from drillctrl.strings.rig import StringRig, string_rig
+from drillctrl.strings.rig import StringRig, WeightControl, string_rig
 from drillctrl.strings.section import KINDS, MATERIALS, Section, ToolJoint
 
+# What a fit to a recording knows of its rig, beside the rig itself.
+FIT = "fit"
+PRESETS = (*LUMPED_PRESETS, *STRING_PRESETS)
 # No hole is wider.
 _WIDEST = 1.0
 _MOST_BYTES = 10_000_000
@@ -31,7 +35,7 @@ _KINDS = {
     **{kind: kind for kind in KINDS},
     **{"dp": "pipe", "drill pipe": "pipe", "hwdp": "heavy-weight", "dc": "collar"},
 }
-_PARTS: dict[str, dict[str, Dimension | None]] = {
+PARTS: dict[str, dict[str, Dimension | None]] = {
     "bit": {
         "diameter": units.LENGTH,
         "blades": None,
@@ -51,19 +55,24 @@ _PARTS: dict[str, dict[str, Dimension | None]] = {
     },
     "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
     "mud": {"density": units.DENSITY},
-    "hoisting": {"stiffness": units.STIFFNESS},
+    "hoisting": {
+        "stiffness": units.STIFFNESS,
+        "block_mass": units.MASS,
+        "feed_gain": units.FEED_GAIN,
+    },
 }
 # What may be left out: whole tables, and keys of tables.
 _OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
 _OPTIONAL = (
     *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
     *("torsional", "axial", "kelvin_voigt"),
+    *("stiffness", "block_mass", "feed_gain"),
 )
 # Attributes of a rig, and what they are called in a file.
 _CALLED = {"bit_radius": "diameter", "bit_geometry": "geometry", "rock_strength": "strength"}
 # Numbers in the unit that the format names.
 _BARE = ("blades", "torsional", "axial", "kelvin_voigt")
-_COLUMNS: dict[str, Dimension | None] = {
+COLUMNS: dict[str, Dimension | None] = {
     "name": None,
     "type": None,
     "pipe": None,
@@ -90,6 +99,7 @@ _ALSO = {
 }
 
 
+@checks_kinds
 def load_rig(source: str | Path) -> Rig:
     """Load a rig by the name of a preset or from a TOML file.
 
@@ -108,21 +118,67 @@ def load_rig(source: str | Path) -> Rig:
         If there is no such preset or file, or the file is not TOML, lacks a key, has one too
         many, or holds a value outside its range.
     """
-    presets = (*LUMPED_PRESETS, *STRING_PRESETS)
     if str(source) in STRING_PRESETS:
         return string_preset(str(source))
     if str(source) in LUMPED_PRESETS:
         return table1()
-    data = read_toml(source, f"one of the presets {', '.join(presets)} or a readable TOML file")
+    data = read_toml(source, f"one of the presets {', '.join(PRESETS)} or a readable TOML file")
+    return rig_from_data(data, str(source), Path(source).parent)
+
+
+def rig_from_data(data: dict[str, Any], path: str, folder: Path | None = None) -> Rig:
+    """Return the rig of a file that was read.
+
+    Parameters
+    ----------
+    data : dict
+        What TOML holds.
+    path : str
+        What the file is called in messages.
+    folder : Path, optional
+        Where a tally may lie; without it no other file is read.
+
+    Raises
+    ------
+    InputError
+        As `load_rig`.
+    """
+    data = {key: value for key, value in data.items() if key != FIT}
     if "sections" not in data and not {"bit", "rock"} & set(data):
-        return rig_from_mapping(data, str(source))
-    return _string_rig(data, Path(source))
+        return rig_from_mapping(data, path)
+    return _string_rig(data, path, folder)
 
 
-def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
-    _check_keys(data, ("sections", *_PARTS), str(path), _OPTIONAL_PARTS)
+def fitted_errors(source: str | Path) -> dict[str, float]:
+    """Return relative errors of a rig that was fitted to a recording, by name.
+
+    Parameters
+    ----------
+    source : str or Path
+        A preset or a file as of `load_rig`; what holds no ``[fit]`` has none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or an error is no number in [0, 0.9].
+    """
+    if str(source) in PRESETS:
+        return {}
+    known = read_toml(source, "a readable TOML file").get(FIT, {})
+    rows = known.get("uncertainty", {}) if isinstance(known, dict) else {}
+    found = {}
+    for name in ("stiffness", "inertia"):
+        row = rows.get(name) if isinstance(rows, dict) else None
+        if isinstance(row, dict) and "error" in row:
+            where = f"fit.uncertainty.{name}.error in {source}"
+            found[name] = checked_number(where, row["error"], 0.0, 0.9)
+    return found
+
+
+def _string_rig(data: Mapping[str, Any], path: str, folder: Path | None) -> StringRig:
+    _check_keys(data, ("sections", *PARTS), path, _OPTIONAL_PARTS)
     found: dict[str, dict[str, Any]] = {}
-    for part, known in _PARTS.items():
+    for part, known in PARTS.items():
         given = data.get(part, {})
         if not isinstance(given, dict):
             raise InputError(f"{part} in {path}", given, f"a table, [{part}]")
@@ -146,22 +202,41 @@ def _string_rig(data: Mapping[str, Any], path: Path) -> StringRig:
                           ("retardation", "kelvin_voigt"))
         if key in given
     })  # fmt: skip
-    mud, ropes = found["mud"].get("density", 0.0), found["hoisting"].get("stiffness")
-    string = DrillString(_sections(data["sections"], path), damping, mud, ropes)
+    mud, hoisting = found["mud"].get("density", 0.0), found["hoisting"]
+    control = _weight_control(hoisting, data.get("hoisting", {}), path)
+    ropes = hoisting.get("stiffness")
+    string = DrillString(_sections(data["sections"], path, folder), damping, mud, ropes)
     typed = {key: (f"{part}.{key}", value) for part in ("bit", "rock", "top_drive")
              for key, value in data.get(part, {}).items()}  # fmt: skip
+    typed["hoisting stiffness"] = "hoisting.stiffness", data.get("hoisting", {}).get("stiffness")
     for parameter, key in _CALLED.items():
         typed[parameter] = typed.pop(key, (key, None))
-    with blamed_on(str(path), typed):
+    with blamed_on(path, typed):
         return string_rig(
             string,
             drive=DriveMachine(**drive) if drive else None,
+            weight_control=control,
             bit_radius=0.5 * diameter,
             bit_geometry=bit.pop("geometry"),
             rock_strength=rock["strength"],
             contact_strength=rock["contact_strength"],
             **bit,
         )
+
+
+def _weight_control(
+    hoisting: Mapping[str, Any], written: Mapping[str, Any], path: str
+) -> WeightControl | None:
+    """Return what feeds a string by its weight, if anything does."""
+    names = ("block_mass", "feed_gain")
+    missing = [name for name in names if name not in hoisting]
+    if len(missing) == len(names):
+        return None
+    if missing:
+        raise InputError(f"{missing[0]} in [hoisting] of {path}", "(missing)", "given")
+    typed = {name.replace("_", " "): (f"hoisting.{name}", written[name]) for name in names}
+    with blamed_on(path, typed):
+        return WeightControl(**{name: hoisting[name] for name in names})
 
 
 def _check_keys(
@@ -178,11 +253,11 @@ def _check_keys(
         raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
 
 
-def _sections(given: Any, path: Path) -> tuple[Section, ...]:
-    if isinstance(given, str):
-        return read_tally(path.parent / given)
+def _sections(given: Any, path: str, folder: Path | None) -> tuple[Section, ...]:
+    if isinstance(given, str) and folder is not None:
+        return read_tally(folder / given)
     if not isinstance(given, list) or not given or not all(isinstance(r, dict) for r in given):
-        wanted = "tables, [[sections]], or the name of a CSV file"
+        wanted = "tables, [[sections]]" + (", or the name of a CSV file" if folder else "")
         raise InputError(f"sections in {path}", given, wanted)
     found = []
     for i, row in enumerate(given, 1):
@@ -191,6 +266,7 @@ def _sections(given: Any, path: Path) -> tuple[Section, ...]:
     return tuple(found)
 
 
+@checks_kinds
 def read_tally(path: str | Path) -> tuple[Section, ...]:
     """Return the sections of a string from a CSV file, from the top down.
 
@@ -225,8 +301,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
         names.append(_ALSO.get(name, name))
         behind.append(match[2])
     for name, title in zip(names, table[0], strict=True):
-        if name not in _COLUMNS:
-            raise InputError(f"column of {path}", title, f"one of {', '.join(_COLUMNS)}")
+        if name not in COLUMNS:
+            raise InputError(f"column of {path}", title, f"one of {', '.join(COLUMNS)}")
     sections = []
     for line, row in enumerate(table[1:], 2):
         where = f"row {line} of {path}"
@@ -238,17 +314,17 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
             if not value:
                 continue
             bare = re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", value)
-            cells[name] = f"{value} {unit}" if unit and bare and _COLUMNS[name] else value
+            cells[name] = f"{value} {unit}" if unit and bare and COLUMNS[name] else value
         sections.append(_section(cells, where))
     return tuple(sections)
 
 
 def _section(row: Mapping[str, Any], where: str) -> Section:
     for key in row:
-        if key not in _COLUMNS:
-            raise InputError(f"key in {where}", key, f"one of {', '.join(_COLUMNS)}")
+        if key not in COLUMNS:
+            raise InputError(f"key in {where}", key, f"one of {', '.join(COLUMNS)}")
     value: dict[str, Any] = {
-        key: given if _COLUMNS[key] is None else _si(f"{key} in {where}", given, _COLUMNS[key])
+        key: given if COLUMNS[key] is None else _si(f"{key} in {where}", given, COLUMNS[key])
         for key, given in row.items()
     }
     bought = pipe(str(row["pipe"])) if "pipe" in row else None

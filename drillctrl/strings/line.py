@@ -82,6 +82,8 @@ class Stretch(NamedTuple):
 class Line:
     """Stretches from the top end to the bit."""
 
+    made_by = "the torsion of a DrillString"
+
     stretches: tuple[Stretch, ...]
 
     @property
@@ -105,16 +107,19 @@ class Line:
 
     def scaled_transfer(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the transfer matrix without its growth, and the exponent of that."""
-        eye = np.broadcast_to(np.eye(2, dtype=complex), (*s.shape, 2, 2))
-        whole, exponent = eye, np.zeros_like(s)
+        one, none = np.ones_like(s, dtype=complex), np.zeros_like(s, dtype=complex)
+        whole, exponent = _Matrix(one, none, none, one), none
         for stretch in self.stretches:
-            once = eye
+            once: _Matrix | None = None
             for piece in stretch.pieces:
                 matrix, growth = _transfer(piece, s)
-                once = matrix @ once
+                once = matrix if once is None else _product(matrix, once)
                 exponent = exponent + stretch.repeats * growth
-            whole = np.linalg.matrix_power(once, stretch.repeats) @ whole
-        return whole, exponent
+            if once is not None:
+                whole = _product(_power(once, stretch.repeats), whole)
+        found = np.empty((*s.shape, 2, 2), dtype=complex)
+        found[..., 0, 0], found[..., 0, 1], found[..., 1, 0], found[..., 1, 1] = whole
+        return found, exponent
 
     def at_bit(
         self, s: npt.ArrayLike, top: npt.ArrayLike = np.inf
@@ -171,15 +176,42 @@ class Line:
         return float(np.sqrt(piece.mass * piece.stiffness))
 
 
-def _transfer(piece: Piece, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+class _Matrix(NamedTuple):
+    """Entries of 2 × 2 matrices, row by row, (...) each: products of stacks are slow."""
+
+    a: ComplexArray
+    b: ComplexArray
+    c: ComplexArray
+    d: ComplexArray
+
+
+def _product(m: _Matrix, n: _Matrix) -> _Matrix:
+    return _Matrix(
+        m.a * n.a + m.b * n.c, m.a * n.b + m.b * n.d, m.c * n.a + m.d * n.c, m.c * n.b + m.d * n.d
+    )
+
+
+def _power(matrix: _Matrix, count: int) -> _Matrix:
+    """Return a product of equal matrices, one or more, by squaring."""
+    whole, square = None, matrix
+    while True:
+        if count % 2:
+            whole = square if whole is None else _product(square, whole)
+        count //= 2
+        if not count:
+            assert whole is not None
+            return whole
+        square = _product(square, square)
+
+
+def _transfer(piece: Piece, s: ComplexArray) -> tuple[_Matrix, ComplexArray]:
     """Return a piece's matrix over exp(x), and x = γ times its length."""
     k = piece.stiffness * (1.0 + piece.retardation * s)
     square = piece.length**2 * (piece.mass * s + piece.damping) * s / k
     x = np.sqrt(square)
-    decayed = np.exp(-2.0 * x)
+    fallen = np.expm1(-2.0 * x)
     small = np.abs(x) < 1e-8
-    along = 0.5 * (1.0 + decayed)
-    across = np.where(small, 1.0, -0.5 * np.expm1(-2.0 * x) / np.where(small, 1.0, x))
-    rows = [[along, piece.length / k * across], [k / piece.length * square * across, along]]
-    stacked = [np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows]
-    return np.stack(stacked, axis=-2), x
+    along = np.asarray(1.0 + 0.5 * fallen, dtype=complex)
+    across = np.where(small, 1.0, -0.5 * fallen / np.where(small, 1.0, x))
+    scaled = piece.length / k
+    return _Matrix(along, scaled * across, square * across / scaled, along), x

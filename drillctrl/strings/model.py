@@ -65,6 +65,9 @@ class PipeString(StringModel):
         had eight modes if that is higher.
     tolerance : float
         Largest error of the reflection of a wave at the bit up to there.
+    units : DrillString, optional
+        The string whose lumped equivalent makes the units of mass, force and time, where that
+        is another: so that strings of several lengths share points and gains.
 
     Raises
     ------
@@ -75,6 +78,7 @@ class PipeString(StringModel):
     string: DrillString
     frequencies: tuple[float, float]
     tolerance: float
+    units: DrillString
     unused_groups = ("eta", "xi", "kappa")
 
     def __init__(
@@ -83,6 +87,7 @@ class PipeString(StringModel):
         torsional_frequency: float | None = None,
         axial_frequency: float | None = None,
         tolerance: float = TOLERANCE,
+        units: DrillString | None = None,
     ) -> None:
         super().__init__()
         frequencies = tuple(
@@ -95,12 +100,17 @@ class PipeString(StringModel):
             )
         )
         tolerance = checked_number("tolerance", tolerance, 1e-6, 1.0)
-        self.__dict__.update(string=string, frequencies=frequencies, tolerance=tolerance)
+        self.__dict__.update(
+            string=string,
+            frequencies=frequencies,
+            tolerance=tolerance,
+            units=string if units is None else units,
+        )
 
     @property
     def form(self) -> Any:
         """The string and how closely it is resolved."""
-        return PipeString, self.string, self.frequencies, self.tolerance
+        return PipeString, self.string, self.frequencies, self.tolerance, self.units
 
     @property
     def resolved(self) -> Resolved:
@@ -108,10 +118,10 @@ class PipeString(StringModel):
         return resolve(self.string, *self.frequencies, self.tolerance)
 
     def build(self, c: Coefficients, q: Any) -> String:
-        """Return the string, scaled to the units of its lumped equivalent."""
+        """Return the string, scaled to its units."""
         found = self.resolved
-        axial = lumped(self.string, self.string.tension)
-        torsional = lumped(self.string, self.string.torsion)
+        axial = lumped(self.units, self.units.tension)
+        torsional = lumped(self.units, self.units.torsion)
         time = np.sqrt(torsional.mass / torsional.stiffness)
         # The coefficients say what the units of force and time are.
         rate = (c.torsional_stiffness / c.inertia) ** 0.5 * time

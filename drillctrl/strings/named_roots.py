@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import SI, Language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.strings.at_bit import fed_by_weight
 from drillctrl.strings.check import AXIAL_BAND, TORSIONAL_BAND, Mode, string_modes
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_law import DriveLaw
@@ -166,6 +168,7 @@ def turned_by(case: Case) -> DriveControl | None:
     return laws[0].__dict__["control"] if laws else None
 
 
+@checks_kinds
 def named_roots(
     where: Where,
     structure: FeedbackStructure | None = None,
@@ -196,6 +199,8 @@ def named_roots(
     if case.plant is None or not isinstance(case.plant.string, PipeString):
         return None
     control = turned_by(case)
+    if fed_by_weight(case.plant):
+        return None
     if (case.plant.blocks and control is None) or case.plant.string.string.hoisting_stiffness:
         return None
     string = case.plant.string.string

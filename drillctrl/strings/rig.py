@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.drive import TopDrive
+from drillctrl.drilling.hoist import Hoist
 from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.sensors import Lagging, LateInput
 from drillctrl.strings.drill_string import DrillString
@@ -27,6 +29,32 @@ _LUMPED = (
 
 
 @dataclass(frozen=True)
+class WeightControl:
+    """A hook that is fed by its weight; see `Hoist`.
+
+    Attributes
+    ----------
+    block_mass : float
+        Of travelling block, hook and top drive, kg.
+    feed_gain : float
+        Rate of feed per weight that is missing, m/s/N: the feed is V0 at the weight on bit of
+        steady drilling, and nothing where there is V0 over this gain more.
+
+    Raises
+    ------
+    InputError
+        If a value is not positive.
+    """
+
+    block_mass: float
+    feed_gain: float
+
+    def __post_init__(self) -> None:
+        checked_number("block mass", self.block_mass, 0.0, 1e7, open_low=True)
+        checked_number("feed gain", self.feed_gain, 0.0, 1.0, open_low=True)
+
+
+@dataclass(frozen=True)
 class StringRig(Rig):
     """A rig with a real string; make it with `string_rig`.
 
@@ -39,15 +67,21 @@ class StringRig(Rig):
         What hangs between top end and bit.
     drive : DriveMachine or None
         The top drive; None where the speed is imposed.
+    weight_control : WeightControl or None
+        What feeds the string by its weight; None where the feed is imposed.
 
     Raises
     ------
     InputError
-        If a lumped number is not what follows from the string.
+        If a lumped number is not what follows from the string, or there are both ropes that give
+        way and a control of the weight.
     """
+
+    made_by = "string_preset('vertical-3000')"
 
     string: DrillString = field(kw_only=True)
     drive: DriveMachine | None = field(default=None, kw_only=True)
+    weight_control: WeightControl | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -55,6 +89,17 @@ class StringRig(Rig):
             if abs(getattr(self, name) - value) > 1e-9 * abs(value):
                 wanted = f"{value:.10g}, which follows from the string"
                 raise InputError(name, getattr(self, name), wanted)
+        if self.weight_control is not None and self.string.hoisting_stiffness is not None:
+            wanted = "left out under a control of the weight, which is softer than ropes"
+            raise InputError("hoisting stiffness", self.string.hoisting_stiffness, wanted)
+
+    def hoist(self) -> tuple[Hoist, ...]:
+        """Return what feeds the string, if that is not imposed, as a part of a plant."""
+        control = self.weight_control
+        if control is None:
+            return ()
+        damping = self.time_scale / (control.feed_gain * self.mass)
+        return (Hoist(hoist_mass=control.block_mass / self.mass, hoist_damping=damping),)
 
     def hardware(self) -> dict[str, Any]:
         """Return string and drive as parts of a plant.
@@ -62,10 +107,11 @@ class StringRig(Rig):
         The drive's torque lags and is late as the machine says; its measurements are as they
         are, filters being part of a law.
         """
-        parts: dict[str, Any] = {"string": PipeString(self.string)}
+        parts: dict[str, Any] = {"string": PipeString(self.string), "blocks": self.hoist()}
         machine = self.drive
         if machine is not None:
-            blocks: list[Block] = [TopDrive(inertia_ratio=machine.inertia / self.inertia)]
+            blocks: list[Block] = [*self.hoist()]
+            blocks.append(TopDrive(inertia_ratio=machine.inertia / self.inertia))
             if machine.lag:
                 blocks.append(Lagging("drive", machine.lag / self.time_scale))
             if machine.delay:
@@ -89,8 +135,13 @@ def lumped_values(string: DrillString) -> dict[str, float]:
     return dict(zip(_LUMPED, values, strict=True))
 
 
+@checks_kinds
 def string_rig(
-    string: DrillString, *, drive: DriveMachine | None = None, **bit_and_rock: Any
+    string: DrillString,
+    *,
+    drive: DriveMachine | None = None,
+    weight_control: WeightControl | None = None,
+    **bit_and_rock: Any,
 ) -> StringRig:
     """Return a rig with a real string.
 
@@ -100,13 +151,16 @@ def string_rig(
         The string.
     drive : DriveMachine, optional
         The top drive.
+    weight_control : WeightControl, optional
+        What feeds the string by its weight.
     **bit_and_rock
         The attributes of `Rig` that say what bit and rock are.
     """
     values: dict[str, Any] = {**lumped_values(string), **bit_and_rock}
-    return StringRig(**values, string=string, drive=drive)
+    return StringRig(**values, string=string, drive=drive, weight_control=weight_control)
 
 
+@checks_kinds
 def lump(rig: Rig) -> Rig:
     """Return a rig of the paper's kind: one axial and one torsional degree of freedom.
 

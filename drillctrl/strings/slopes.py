@@ -6,6 +6,7 @@ speed swings undamped at s = iω where the impedance that the string shows it is
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_rules import drive_poles
 from drillctrl.strings.elements import ELEMENT_LENGTH, elements, free_modes
@@ -30,6 +32,8 @@ _GROWTH = 1e-4
 HIGHEST, _CLOSE, _CLOSER = 30.0, 4, 5.0
 # Share of J ω that the drive's feedback still has where nothing above needs to be looked at.
 _INERTIAL = 0.1
+# Samples across the width of a resonance.
+_WIDTHS = 10.0
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,7 @@ def bit_impedance(line: Line, control: DriveControl | None, s: npt.ArrayLike) ->
     return np.asarray(line.bit_stiffness(at, top) / at)
 
 
+@checks_kinds
 def critical_slopes(
     line: Line, control: DriveControl | None, frequency: float, step: float = 1e-3
 ) -> tuple[CriticalSlope, ...]:
@@ -121,6 +126,19 @@ def critical_slopes(
     if not 0.0 < step < frequency:
         raise InputError("step", step, f"in (0, {frequency:g}) Hz")
     return _crossings(line, control, np.arange(step, frequency + step, step))
+
+
+def _bands_and_crossings(
+    line: Line, control: DriveControl | None, count: int, highest: float | None = None
+) -> tuple[FloatArray, FloatArray, tuple[CriticalSlope, ...]]:
+    """Return `mode_bands`, and crossings up to their end or, by coarser samples, beyond."""
+    modes, ends = mode_bands(line, count)
+    step, near = float(modes[0]) / _PER_MODE, float(ends[-1])
+    if highest is None:
+        return modes, ends, critical_slopes(line, control, near, step)
+    near = min(near, highest)
+    at = np.concatenate([np.arange(step, near, step), np.arange(near, highest, _CLOSER * step)])
+    return modes, ends, _crossings(line, control, np.append(at, highest))
 
 
 def _crossings(
@@ -164,6 +182,7 @@ def mode_bands(line: Line, count: int) -> tuple[FloatArray, FloatArray]:
     return known[:count], 0.5 * (known[1:] + known[:-1])
 
 
+@checks_kinds
 def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tuple[ModeSlope, ...]:
     """Return the critical slope of each of the first modes of torsion.
 
@@ -179,9 +198,7 @@ def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tup
         Number of modes, 1 to 20.
     """
     checked_integer("modes", count, 1, 20)
-    modes, ends = mode_bands(line, count)
-    step = float(modes[0]) / _PER_MODE
-    crossings = critical_slopes(line, control, float(ends[-1]), step)
+    modes, ends, crossings = _bands_and_crossings(line, control, count)
     most = lowest_impedance(line)
     found, low = [], 0.0
     for i, (mode, high) in enumerate(zip(modes.tolist(), ends.tolist(), strict=True)):
@@ -193,6 +210,7 @@ def mode_slopes(line: Line, control: DriveControl | None, count: int = 4) -> tup
     return tuple(found)
 
 
+@checks_kinds
 def weakest_slope(
     line: Line, control: DriveControl | None, highest: float = HIGHEST
 ) -> CriticalSlope | None:
@@ -215,15 +233,12 @@ def weakest_slope(
         None where no slope below the impedance of the lowest stretch makes any of them grow.
     """
     checked_number("highest", highest, 0.0, 1e3, open_low=True)
-    modes, ends = mode_bands(line, _CLOSE)
-    step = float(modes[0]) / _PER_MODE
-    most, near = lowest_impedance(line), min(float(ends[-1]), highest)
-    at = np.concatenate([np.arange(step, near, step), np.arange(near, highest, _CLOSER * step)])
-    crossings = _crossings(line, control, np.append(at, highest))
-    grown = [c for c in crossings if c.grows and 0.0 < c.slope < most]
+    _, _, crossings = _bands_and_crossings(line, control, _CLOSE, highest)
+    grown = [c for c in crossings if c.grows and 0.0 < c.slope < lowest_impedance(line)]
     return min(grown, key=lambda c: c.slope, default=None)
 
 
+@checks_kinds
 def count_growing(
     line: Line, control: DriveControl, slope: float = 0.0, highest: float = 0.0
 ) -> int:
@@ -241,7 +256,12 @@ def count_growing(
         Hz, modulus up to which roots are counted; by default where the drive is its inertia
         and nothing else.
     """
-    radius = 2.0 * np.pi * (highest or _inertial_frequency(control))
+    return _growing(line, control, slope, highest or _inertial_frequency(control))
+
+
+@functools.lru_cache(maxsize=64)
+def _growing(line: Line, control: DriveControl, slope: float, highest: float) -> int:
+    radius = 2.0 * np.pi * highest
     impedance = lowest_impedance(line)
 
     def characteristic(s: ComplexArray) -> ComplexArray:
@@ -273,6 +293,7 @@ def drive_is_stable(line: Line, control: DriveControl) -> bool:
     return count_growing(line, control) == 0
 
 
+@checks_kinds
 def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) -> float:
     """Return by how much later the drive may act before it is unstable by itself, s.
 
@@ -285,7 +306,8 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
     control : DriveControl
         Of the drive.
     step : float
-        Hz between the samples; a resonance narrower than that is missed.
+        Hz between the samples, wider where damping makes all resonances wide; a narrower
+        resonance is missed.
     """
     if not drive_is_stable(line, control):
         return float("nan")
@@ -299,7 +321,7 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
         string = matrix[..., 1, 0] / (matrix[..., 1, 1] * s)
         return np.asarray(lag * (speed + torque * string) / (inertia * s + string))
 
-    at = np.arange(step, _inertial_frequency(control) + step, step)
+    at = _by_widths(line, step, _inertial_frequency(control))
     places, _ = sign_changes(lambda f: np.abs(loop(f)) - 1.0, at)
     if not places.size:
         return float("inf")
@@ -309,3 +331,21 @@ def drive_delay_margin(line: Line, control: DriveControl, step: float = 2e-3) ->
     period = 2.0 * np.pi / omega
     late = late + period * np.ceil((delay - late) / period)
     return float(np.min(late) - delay)
+
+
+def _by_widths(line: Line, step: float, highest: float) -> FloatArray:
+    """Return frequencies, Hz, closer together than resonances are wide, unless a step is wider.
+
+    A wave that decays at the rate σ makes resonances as wide as σ/π.
+    """
+    pieces = [piece for stretch in line.stretches for piece in stretch.pieces if piece.mass]
+
+    def apart(f: float) -> float:
+        omega = 2.0 * np.pi * f
+        rates = [0.5 * (p.damping / p.mass + p.retardation * omega**2) for p in pieces]
+        return max(step, min(rates) / (_WIDTHS * np.pi))
+
+    at = [step]
+    while at[-1] < highest:
+        at.append(at[-1] + apart(at[-1]))
+    return np.array(at)

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
-from drillctrl.base.errors import InputError, checked_number, takes
+from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress
 from drillctrl.simulation.controller import Controller
@@ -191,7 +192,7 @@ class Campaign:
         return f"<Campaign: {size} points, sizes {', '.join(f'{s:g}' for s in self.sizes)}>"
 
 
-@takes(Grid, "a Grid, such as dimensionless_grid makes of a point")
+@checks_kinds
 def campaign(
     grid: Grid,
     controller: Controller | GainTable | None = None,

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.design import analyze, design
-from drillctrl.designs.drilling import Drilling, Swing, measured_swings
+from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.margins import point_margins
 from drillctrl.designs.motion_design import fits_motion, motion_design, why_not_smooth
 from drillctrl.designs.result import Analysis
 from drillctrl.designs.robustness import relative_radius
+from drillctrl.designs.swings import Swing, measured_swings
 from drillctrl.designs.trials import uncontrolled_runs
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.structures import as_structure
@@ -99,6 +101,7 @@ def _subjects(
     return subjects
 
 
+@checks_kinds
 def compare(
     point: Where,
     structures: Sequence[str | FeedbackStructure] = ("p", "case1", "pd", "case2"),

@@ -12,12 +12,13 @@ import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import DIMENSIONLESS
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.report import Report, report
 from drillctrl.drilling.case import Case, as_case
-from drillctrl.drilling.point import RigPoint, takes_rig_point
+from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import steady_state
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.drive_control import law_controller
@@ -79,7 +80,7 @@ def check_report_path(path: str | Path) -> None:
         raise InputError("path", str(path), "a name that ends in .html")
 
 
-@takes_rig_point
+@checks_kinds
 def rig_report(
     where: RigPoint,
     structure: str | None = None,

@@ -18,10 +18,14 @@ import numpy as np
 from drillctrl.base.codec import decode, encode
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import check_regular, write_text
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure, Tie
 from drillctrl.delay.system import DelaySystem
-from drillctrl.designs import drilling, loop_analysis, mode_shift, trials, verdict, worst_case
+from drillctrl.designs import loop_analysis, mode_shift, trials, verdict, worst_case
+from drillctrl.designs.controlled_swings import ControlledSwing, OnMotion
+from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.result import Analysis, Design
+from drillctrl.designs.swings import Swing
 from drillctrl.drilling.case import Case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
@@ -34,7 +38,7 @@ from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.spectrum.multiplicity import Root
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.strings import drill_string, drive_control, section
-from drillctrl.strings.rig import StringRig
+from drillctrl.strings.rig import StringRig, WeightControl
 from drillctrl.studies.campaign import Campaign
 from drillctrl.studies.trial import OUTCOMES
 from drillctrl.synthesis import certificate, family, objectives
@@ -53,13 +57,14 @@ _PARTS: tuple[type, ...] = (
     *(outcome.Figures, status.Outcome, status.Status),
     *(objectives.Exact, objectives.SemiDiscrete, objectives.Robust, objectives.HInfinity),
     *(objectives.Requirements, worst_case.WorstCase, certificate.OptimalityCertificate),
-    *(family.ActiveRoot, drilling.Drilling, drilling.Swing, drilling.ControlledSwing),
-    *(drilling.OnMotion, drill_string.DrillString, drill_string.Damping, section.Section),
-    *(section.Material, section.ToolJoint, drive_control.DriveMachine),
+    *(family.ActiveRoot, Drilling, Swing, ControlledSwing, OnMotion),
+    *(drill_string.DrillString, drill_string.Damping, section.Section),
+    *(section.Material, section.ToolJoint, drive_control.DriveMachine, WeightControl),
 )
 _CLASSES = {kind.__name__: kind for kind in _PARTS}
 
 
+@checks_kinds
 def save_result(result: Design | Analysis | Simulation | Campaign, path: str | Path) -> None:
     """Write a result to a JSON file, whole or not at all; `load_result` reads it.
 
@@ -97,6 +102,7 @@ def save_result(result: Design | Analysis | Simulation | Campaign, path: str | P
     write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
+@checks_kinds
 def load_result(
     path: str | Path, plant: Plant | None = None
 ) -> Design | Analysis | Simulation | Campaign:

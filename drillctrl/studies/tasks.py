@@ -103,7 +103,7 @@ def controller_at(
     """
     if not isinstance(controller, GainTable):
         return controller
-    K1, K2 = controller.gains_at(*(case.parameters[name] for name in controller.grid.names))
+    K1, K2 = controller.gains_at(*controller.grid.place_of(case))
     plant = controller.grid.plant
     return Controller(controller.structure, K1[0], K2[0], plant=plant, **(surroundings or {}))
 

@@ -14,6 +14,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import Progress
 from drillctrl.charts.chart import chart
 from drillctrl.charts.plane import AxisLike, Plane, make_plane
@@ -114,6 +115,7 @@ class VibrationMap(MapValues):
         return f"<VibrationMap: {len(self.nodes)} points over {x} × {y}, {control}>"
 
 
+@checks_kinds
 def vibration_map(
     point: Where,
     x: AxisLike = ("omega0", 4.0, 24.0),

@@ -150,10 +150,9 @@ class MapValues:
         """Count the points whose gains a table does not vouch for; 0 without a table."""
         if not isinstance(self.controller, GainTable):
             return 0
-        names = self.controller.grid.names
-        cases = [self.plane.case_at(*place).parameters for place in self.points.tolist()]
-        groups = [[case[name] for case in cases] for name in names]
-        return int((~self.controller.stable_at(*groups)).sum())
+        grid = self.controller.grid
+        places = [grid.place_of(self.plane.case_at(*place)) for place in self.points.tolist()]
+        return int((~self.controller.stable_at(*zip(*places, strict=True))).sum())
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON types."""

@@ -170,6 +170,9 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
         held[:k] |= on_bound
     for used in range(1, 1 + _NEWTON_STEPS):
         value, jacobian = task.values(u)
+        if not (np.isfinite(value).all() and np.isfinite(jacobian).all()):
+            # Determinants of many states overflow far from where the search began.
+            return None, used
         free = ~held
         rows = value.size
         if rows > free.sum():

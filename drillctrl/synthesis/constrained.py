@@ -12,7 +12,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.synthesis.certificate import OptimalityCertificate, shortest_combination
 from drillctrl.synthesis.descent import Objective, bfgs
 from drillctrl.synthesis.family import LoopFamily
-from drillctrl.synthesis.search import spread_points
+from drillctrl.synthesis.spread import spread_points
 
 _LOOKED = 64
 _BEGUN = 6

@@ -13,6 +13,7 @@ from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
+from drillctrl.synthesis.spread import spread_points
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
@@ -173,22 +174,6 @@ def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[Float
     tolerance = 1e-6 * (1.0 + abs(best.value))
     hits = sum(basin.value <= best.value + tolerance for basin in everything)
     return Search(best, distinct, hits, evaluations)
-
-
-def spread_points(count: int, dimension: int, seed: int) -> FloatArray:
-    """Return points that fill the unit cube evenly, (count, dimension).
-
-    Multiples, modulo 1, of numbers that are hardest to approximate by fractions together (a
-    Kronecker sequence with powers of the root of x^(d + 1) = x + 1), begun in the middle, and
-    at random for any seed but 0. SciPy's sequences lead to no better designs and take longer to
-    load than the whole search.
-    """
-    root = 2.0
-    for _ in range(60):
-        root = (1.0 + root) ** (1.0 / (dimension + 1))
-    steps = root ** -np.arange(1.0, dimension + 1)
-    begin = np.random.default_rng(seed).random(dimension) if seed else 0.5
-    return np.asarray((begin + np.arange(1, count + 1)[:, None] * steps) % 1.0)
 
 
 def starting_points(family: LoopFamily, seed: int, effort: Effort) -> FloatArray:

@@ -12,10 +12,11 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.loops import spectral_abscissas
+from drillctrl.strings.changed import CHANGES
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.measures import worst_case
+from drillctrl.tables.batch import abscissas_at
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import (
     CONSTANT,
@@ -97,7 +98,8 @@ def check_cells(task: CellTask) -> tuple[IntArray, Cells]:
     """Check the interpolated gains in some cells, and mend those that fail.
 
     α is computed at the centre, the middles of the edges and faces, and the corners; from the
-    worst of these a pattern search looks for a worse point. A cell passes if what it finds is
+    worst of these a pattern search looks for a worse point, at its depth where that is an axis:
+    every other depth is another plant. A cell passes if what it finds is
     negative by a tenth of the range of α in the cell. One that fails with stable corners is
     given the constant gains that are best at its worst of these points, if they pass.
 
@@ -147,10 +149,7 @@ def _abscissas(
     if cells is not None:
         own = cells.mode[index] == CONSTANT
         vectors[own] = cells.gains[index[own]]
-    groups = grid.groups(coordinates)
-    parameters = dict(zip(grid.names, groups.T, strict=True))
-    first = grid.case(*(axis.values[0] for axis in grid.axes))
-    return spectral_abscissas(first, parameters, structure, vectors)
+    return abscissas_at(grid, structure, coordinates, vectors)
 
 
 def _worst(
@@ -173,9 +172,9 @@ def _worst(
     directions = np.array(
         [
             sign * unit
-            for unit, size in zip(np.eye(3), grid.shape, strict=True)
+            for unit, size, axis in zip(np.eye(3), grid.shape, grid.axes, strict=True)
             for sign in (-1.0, 1.0)
-            if size > 1
+            if size > 1 and axis.name not in CHANGES
         ]
     ).reshape(-1, 3)
     if not len(directions):

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.synthesis.family import ActiveRoot
 from drillctrl.synthesis.objectives import EXACT, Exact, Objective
+from drillctrl.tables.batch import abscissas_at
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.node import NodeDesign, NodeTask, design_node
 
@@ -187,13 +187,7 @@ def _restarts(
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
     gains = np.array([found[i].gains for i in range(len(grid.points))])
     own = np.array([found[i].spectral_abscissa for i in range(len(grid.points))])
-    groups = grid.groups(grid.coordinates)[pairs[:, 0]]
-    borrowed = spectral_abscissas(
-        grid.cases[0],
-        dict(zip(grid.names, groups.T, strict=True)),
-        structure,
-        gains[pairs[:, 1]],
-    )
+    borrowed = abscissas_at(grid, structure, grid.coordinates[pairs[:, 0]], gains[pairs[:, 1]])
     here, there = own[pairs[:, 0]], own[pairs[:, 1]]
     promise = borrowed < here - 1e-6
     # A neighbour that does much better by far other gains may sit in a better basin, and so may

@@ -15,6 +15,7 @@ from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.quantities import SI_UNITS
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.plcopen import plcopen_text
+from drillctrl.tables.recorded import RecordedMotion
 from drillctrl.tables.reserved import is_identifier
 from drillctrl.tables.sampled import SampledController, sampled_controller
 from drillctrl.tables.settings import STATUS_BITS, Options
@@ -45,7 +46,7 @@ def export_st(
     *,
     period: float,
     limit: float,
-    motion: FloatArray | None = None,
+    motion: FloatArray | RecordedMotion | None = None,
     **options: Unpack[Options],
 ) -> Path:
     """Write one function block: lookup, delay line, saturation, soft switch-on.
@@ -67,7 +68,7 @@ def export_st(
         Sampling period, dimensionless or s.
     limit : float
         Largest |u|, dimensionless or N·m.
-    motion : array, (n, p), optional
+    motion : array, (n, p), or RecordedMotion, optional
         Recorded outputs to replay, a row a sample; by default a motion is made up (`vectors_of`).
     **options
         Of `Options`: ramp, outside, fade, hold, watchdog, rate_limit, release.

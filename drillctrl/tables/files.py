@@ -14,6 +14,7 @@ import numpy as np
 from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
 from drillctrl.base.files import check_regular, replacing
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.tables.document import Document, checked_layout, from_document, to_document
@@ -29,6 +30,7 @@ _WHOLE = ("stable", "certified", "refused")
 _ATTRIBUTES = b"PANDAS_ATTRS"
 
 
+@checks_kinds
 def save_table(table: GainTable, path: str | Path) -> None:
     """Write a table, whole or not at all.
 
@@ -53,6 +55,7 @@ def save_table(table: GainTable, path: str | Path) -> None:
         _FORMATS[Path(path).suffix.lower()][0](document, file)
 
 
+@checks_kinds
 def load_table(path: str | Path, plant: Plant | None = None) -> GainTable:
     """Read a table that `save_table` wrote.
 

@@ -12,11 +12,14 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.drilling.case import Case, as_case
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.steady import rig_point_at_weight_on_bit, weight_on_bit
+from drillctrl.strings.changed import CHANGES, restrung
+from drillctrl.strings.model import PipeString
 
 MAX_NODES = 1_000_000
 
@@ -29,6 +32,8 @@ AXIS_UNITS = {
     "penetration_rate": "m/s",
     "weight_on_bit": "N",
     "rock_strength": "Pa",
+    "depth": "m",
+    "mud": "kg/m**3",
 }
 # What people read: a unit of the field, and how many of it are one SI unit.
 FIELD_UNITS = {
@@ -36,10 +41,13 @@ FIELD_UNITS = {
     "penetration_rate": ("m/h", 3600.0),
     "weight_on_bit": ("kN", 1e-3),
     "rock_strength": ("MPa", 1e-6),
+    "depth": ("m", 1.0),
+    "mud": ("sg", 1e-3),
 }
 DIMENSIONLESS = ("omega0", "delta0", "psi")
-RATE = ("rotary_speed", "penetration_rate", "rock_strength")
-WEIGHT = ("rotary_speed", "weight_on_bit", "rock_strength")
+FEEDS = ("penetration_rate", "weight_on_bit")
+# In the place of rock: what changes the string of a rig.
+THIRD = ("rock_strength", *CHANGES)
 
 
 @dataclass(frozen=True)
@@ -88,6 +96,7 @@ class Axis:
         return f"{self.name.replace('_', ' ')} {numbers} {unit}".strip()
 
 
+@checks_kinds
 def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
     """Return evenly spaced values, both ends included."""
     for end in (low, high):
@@ -101,13 +110,14 @@ def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """All combinations of a rotary speed, a feed and a rock.
+    """All combinations of a rotary speed, a feed and a rock, or depth or mud of a string.
 
     Attributes
     ----------
     axes : tuple of three Axis
-        Named as `DIMENSIONLESS`, `RATE` or `WEIGHT`, in that order; a parameter of the plant's
-        parts may take the place of ψ. The last varies fastest among the nodes.
+        Named as `DIMENSIONLESS`, or ``rotary_speed``, one of `FEEDS` and one of `THIRD`, in that
+        order; a parameter of the plant's parts may take the place of ψ. The last varies fastest
+        among the nodes. Points and gains have the units of the rig whatever the depth.
     reference : OperatingPoint or Rig
         What does not vary: η, ξ, κ and n of a dimensionless grid, the rig of the others.
     plant : Plant
@@ -119,6 +129,8 @@ class Grid:
         If axes and reference do not fit, or there are more than `MAX_NODES` nodes.
     """
 
+    made_by = "dimensionless_grid makes of a point"
+
     axes: tuple[Axis, Axis, Axis]
     reference: OperatingPoint | Rig
     plant: Plant = None  # type: ignore[assignment]
@@ -128,12 +140,18 @@ class Grid:
             parts = {} if self.rig is None else self.rig.hardware()
             object.__setattr__(self, "plant", paper_plant(**parts))
         names = tuple(axis.name for axis in self.axes)
-        fitting: tuple[tuple[str, ...], ...] = (RATE, WEIGHT)
+        fitting: tuple[tuple[str, ...], ...] = tuple(
+            ("rotary_speed", feed, third) for third in THIRD for feed in FEEDS
+        )
         if self.rig is None:
             fitting = tuple((*DIMENSIONLESS[:2], third) for third in ("psi", *self.plant.own))
         if names not in fitting:
             wanted = " or ".join(", ".join(choice) for choice in fitting)
             raise InputError("axes", ", ".join(names), wanted)
+        if self.restrings:
+            # A value out of range is told before any work is done.
+            for value in self.axes[2].values:
+                restrung(self.plant, **{names[2]: value})
         if math.prod(self.shape) > MAX_NODES:
             raise InputError("grid", f"{math.prod(self.shape)} nodes", f"at most {MAX_NODES} nodes")
 
@@ -145,8 +163,13 @@ class Grid:
     @property
     def names(self) -> tuple[str, str, str]:
         """Parameters of the case that the three axes stand for."""
-        third = "psi" if self.rig is not None else self.axes[2].name
-        return ("omega0", "delta0", third)
+        third = self.axes[2].name
+        return ("omega0", "delta0", "psi" if third == "rock_strength" else third)
+
+    @property
+    def restrings(self) -> bool:
+        """Whether the third axis changes the string."""
+        return self.axes[2].name in CHANGES
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -173,7 +196,9 @@ class Grid:
     def case(self, speed: float, feed: float, rock: float) -> Case:
         """Return what drills at coordinates on the three axes."""
         third, plant = self.names[2], self.plant
-        if third != "psi":
+        if self.restrings:
+            plant = restrung(plant, **{third: rock})
+        elif third != "psi":
             plant = plant.with_values(**{third: rock})
         return Case(plant, self.point(speed, feed, rock))
 
@@ -185,10 +210,22 @@ class Grid:
         return self._rig_point(self.reference, speed, feed, rock).operating_point()
 
     def _rig_point(self, rig: Rig, speed: float, feed: float, rock: float) -> RigPoint:
-        placed = rig.with_rock_strength(rock)
+        placed = rig if self.restrings else rig.with_rock_strength(rock)
         if self.axes[1].name == "weight_on_bit":
             return rig_point_at_weight_on_bit(placed, speed, feed)
         return RigPoint(placed, speed, feed)
+
+    def place_of(self, case: Case) -> tuple[float, float, float]:
+        """Return the values of `names` of a case, as `locate` takes them."""
+        plant, point = case.physics("a place in a table")
+        third = self.names[2]
+        if third not in CHANGES:
+            return point.omega0, point.delta0, case.parameters[third]
+        hung = plant.string
+        if not isinstance(hung, PipeString):
+            raise InputError("string", type(hung).__name__, f"one of sections: it has a {third}")
+        own = hung.string.length if third == "depth" else hung.string.mud_density
+        return point.omega0, point.delta0, own
 
     def groups(self, coordinates: npt.ArrayLike) -> FloatArray:
         """Return `names` at coordinates on the axes in their SI units, (q, 3) → (q, 3)."""
@@ -196,7 +233,8 @@ class Grid:
         if self.rig is None:
             return places
         points = [self.point(*row) for row in places.tolist()]
-        return np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+        found = np.array([[p.omega0, p.delta0, p.psi] for p in points]).reshape(-1, 3)
+        return np.column_stack([found[:, :2], places[:, 2]]) if self.restrings else found
 
     def locate(
         self, omega0: npt.ArrayLike, delta0: npt.ArrayLike, psi: npt.ArrayLike
@@ -209,6 +247,11 @@ class Grid:
         if rig is None:
             return groups
         speed = groups[:, 0] / rig.time_scale
+        if self.restrings:
+            feed = groups[:, 1] * speed * rig.axial_scale
+            if self.axes[1].name == "weight_on_bit":
+                feed = weight_on_bit(rig, speed, feed, rig.rock_strength)
+            return np.column_stack([speed, feed, groups[:, 2]])
         # ψ is proportional to the strength, the axial scale to its inverse (Eqs. 14, 16).
         unit = RigPoint(rig, 1.0, 0.0).operating_point().psi / rig.rock_strength
         strength = groups[:, 2] / unit
@@ -219,11 +262,12 @@ class Grid:
         return np.column_stack([speed, feed, strength])
 
 
+@checks_kinds
 def dimensionless_grid(
     omega0: Axis | float,
     delta0: Axis | float,
     psi: Axis | float = 14.0,
-    reference: OperatingPoint | Case | None = None,
+    reference: Where | None = None,
     *,
     parameter: Axis | None = None,
 ) -> Grid:
@@ -263,6 +307,7 @@ def dimensionless_grid(
     return Grid((axes[0], axes[1], third), here, plant or paper_plant())
 
 
+@checks_kinds
 def rig_grid(
     rig: Rig | RigPoint | Case,
     rotary_speed: Axis | float,
@@ -270,6 +315,8 @@ def rig_grid(
     penetration_rate: Axis | float | None = None,
     weight_on_bit: Axis | float | None = None,
     rock_strength: Axis | float | None = None,
+    depth: Axis | float | None = None,
+    mud: Axis | float | None = None,
 ) -> Grid:
     """Return a grid in rig units, all SI.
 
@@ -283,11 +330,14 @@ def rig_grid(
         m/s, or N; one of the two.
     rock_strength : Axis or float, optional
         Pa; by default that of the rig.
+    depth, mud : Axis or float, optional
+        Length of a string of sections, m, and density of its mud, kg/m³; by default the rig's.
 
     Raises
     ------
     InputError
-        If both feeds or none is given.
+        If both feeds or none is given, more than one of rock, depth and mud varies, or the rig
+        has no string to change.
     """
     if (penetration_rate is None) == (weight_on_bit is None):
         raise InputError("penetration_rate", penetration_rate, "given, or else weight_on_bit")
@@ -298,13 +348,25 @@ def rig_grid(
         if found is None:
             raise InputError("rig", "a case without a rig", "a Rig, or a Case of a RigPoint")
         rig = found
-    names = RATE if weight_on_bit is None else WEIGHT
+    name = FEEDS[0] if weight_on_bit is None else FEEDS[1]
     feed = penetration_rate if penetration_rate is not None else weight_on_bit
     assert feed is not None
-    rock = rig.rock_strength if rock_strength is None else rock_strength
-    axes = [_as_axis(*pair) for pair in zip(names, (rotary_speed, feed, rock), strict=True)]
-    parts = {} if plant is not None else rig.hardware()
-    return Grid((axes[0], axes[1], axes[2]), rig, plant or paper_plant(**parts))
+    plant = plant or paper_plant(**rig.hardware())
+    given = zip(THIRD, (rock_strength, depth, mud), strict=True)
+    thirds = [_as_axis(which, value) for which, value in given if value is not None]
+    varied = [axis for axis in thirds if len(axis.values) > 1]
+    if len(varied) > 1:
+        wanted = f"one value beside values of {varied[0].name}"
+        raise InputError(varied[1].name, list(varied[1].values)[:4], wanted)
+    for axis in thirds:
+        if axis in varied:
+            continue
+        if axis.name in CHANGES:
+            plant = restrung(plant, **{axis.name: axis.values[0]})
+        else:
+            rig = rig.with_rock_strength(axis.values[0])
+    third = varied[0] if varied else Axis("rock_strength", (rig.rock_strength,))
+    return Grid((_as_axis("rotary_speed", rotary_speed), _as_axis(name, feed), third), rig, plant)
 
 
 def _as_axis(name: str, given: Axis | float) -> Axis:

@@ -9,6 +9,8 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
+from drillctrl.drilling.case import Case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller, ScheduleEntry
 from drillctrl.simulation.scenario import Scenario
@@ -38,6 +40,7 @@ def course(point: OperatingPoint, scenario: Scenario, times: FloatArray) -> Floa
     return np.column_stack([omega0, rate / omega0, psi])
 
 
+@checks_kinds
 def scheduled(
     table: GainTable,
     point: OperatingPoint,
@@ -104,7 +107,7 @@ def scheduled(
     third = table.grid.names[2]
     if third != "psi":
         # Nothing in a scenario changes the plant.
-        places[:, 2] = table.grid.plant.own[third]
+        places[:, 2] = table.grid.place_of(Case(table.grid.plant, point))[2]
     K1, K2 = table.gains_at(*places.T)
     vouched = table.stable_at(*places.T)
     fixed = options.get("delay", "fixed") == "fixed"

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.delay.structure import BoolArray, FeedbackStructure
-from drillctrl.designs.loops import spectral_abscissas
+from drillctrl.tables.batch import abscissas_at
 from drillctrl.tables.continuation import edges
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CONSTANT, Cells, cell_shape, corners_of
@@ -57,7 +57,7 @@ def smooth_gains(
     pairs = pairs[movable[pairs].all(axis=1)]
     if not len(pairs) or give_up <= 0.0:
         return gains
-    groups = grid.groups(grid.coordinates)
+    places = grid.coordinates
     width = structure.upper - structure.lower
     colour = sum(np.unravel_index(np.arange(len(best)), grid.shape)) % 2
     beside: list[list[int]] = [[] for _ in best]
@@ -93,8 +93,7 @@ def smooth_gains(
             if not rows:
                 continue
             index, vectors = np.array(rows), np.array(trials)
-            parameters = dict(zip(grid.names, groups[index].T, strict=True))
-            alpha = spectral_abscissas(grid.points[0], parameters, structure, vectors)
+            alpha = abscissas_at(grid, structure, places[index], vectors)
             good = np.flatnonzero(alpha <= limit[index])
             # Trials of a node stand in the order of what they bring; the first good one is taken.
             nodes, first = np.unique(index[good], return_index=True)

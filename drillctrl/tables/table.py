@@ -10,7 +10,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from drillctrl.base.checkpoint import Checkpoint
-from drillctrl.base.errors import InputError, checked_integer, checked_number, takes
+from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.delay.structure import FeedbackStructure, no_control
 from drillctrl.designs.drilling import Drilling
@@ -36,7 +37,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-@takes(Grid, "a Grid, such as dimensionless_grid makes of a point")
+@checks_kinds
 def table(
     grid: Grid,
     structure: str | FeedbackStructure = "case1",

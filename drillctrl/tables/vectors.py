@@ -11,6 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.tableio import csv_text
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.interpolation import BoolArray, IntArray
+from drillctrl.tables.recorded import RecordedMotion
 from drillctrl.tables.sampled import SampledController
 from drillctrl.tables.stepped import SteppedController
 
@@ -72,7 +73,9 @@ class Vectors:
 
 
 def vectors_of(
-    table: GainTable, controller: SampledController, motion: FloatArray | None = None
+    table: GainTable,
+    controller: SampledController,
+    motion: FloatArray | RecordedMotion | None = None,
 ) -> Vectors:
     """Return test vectors of a controller.
 
@@ -80,10 +83,10 @@ def vectors_of(
     ----------
     table, controller : GainTable, SampledController
         What is exported.
-    motion : array, (n, p), optional
-        Recorded outputs, a row a sample, replayed in the middle of the table. By default one is
-        made up that sticks and slips, meets the limit, leaves the table, freezes, stands still in
-        time, and is switched off and on.
+    motion : array, (n, p), or RecordedMotion, optional
+        Recorded outputs, a row a sample, replayed in the middle of the table or where they were
+        recorded. By default one is made up that sticks and slips, meets the limit, leaves the
+        table, freezes, stands still in time, and is switched off and on.
 
     Raises
     ------
@@ -93,10 +96,11 @@ def vectors_of(
     """
     settings, count = controller.settings, len(table.structure.outputs)
     made_up = motion is None
+    given = motion if isinstance(motion, RecordedMotion) else None
     if motion is None:
         outputs = _made_up(controller, count)
     else:
-        outputs = np.asarray(motion, dtype=float)
+        outputs = np.asarray(motion if given is None else given.outputs, dtype=float)
         wanted = f"finite, 1 to {_MOST} rows of {count}: {', '.join(table.structure.outputs)}"
         if outputs.ndim != 2 or outputs.shape[1] != count or not 1 <= len(outputs) <= _MOST:
             raise InputError("motion", f"of shape {outputs.shape}", wanted)
@@ -107,6 +111,8 @@ def vectors_of(
     k = np.arange(rows)
     sway = np.sin(2.0 * np.pi * k / rows)[:, None] if made_up else np.zeros((rows, 1))
     places = (low + high) / 2.0 + 0.45 * (high - low) * sway
+    if given is not None and given.places is not None:
+        places = given.places
     elapsed = np.full(rows, settings.period)
     enable = k >= min(8, rows // 4)
     other, limit = np.zeros(rows), np.full(rows, settings.limit)
@@ -117,6 +123,8 @@ def vectors_of(
         other[:20] = 0.3 * settings.limit
         limit[200:210] = 0.5 * settings.limit
     delay = np.full(rows, 0.9 * (settings.depth - 3) * settings.period)
+    if given is not None and given.delay is not None:
+        delay = given.delay
     steps = SteppedController(controller, count)
     answers: list[tuple[float, bool, int]] = []
     for row in range(rows):

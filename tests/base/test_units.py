@@ -58,6 +58,12 @@ def test_units_of_the_field_are_understood(text, dimension, value):
     assert units.to_si("x", text, dimension) == pytest.approx(value, rel=1e-12)
 
 
+@pytest.mark.parametrize("dimension", units._TYPED_MOST, ids=lambda dimension: dimension.name)
+def test_the_units_typed_most_are_what_pint_makes_of_them(dimension):
+    for unit, value in units._TYPED_MOST[dimension].items():
+        assert units._converted(7.0, unit, dimension) == pytest.approx(7.0 * value, rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("text", "dimension"),
     [
@@ -72,6 +78,7 @@ def test_units_of_the_field_are_understood(text, dimension, value):
         ("", units.SPEED),
         ("fast", units.SPEED),
         ("nan rpm", units.ROTARY_SPEED),
+        ("1 s)", units.TIME),
         ("1e400 m/h", units.SPEED),
         ("9**9**9**9 m/s", units.SPEED),
         ("2 m**9**9**9", units.LENGTH),

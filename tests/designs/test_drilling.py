@@ -27,14 +27,10 @@ from drillctrl import (
     torsional_system,
 )
 from drillctrl.designs.authority import Candidate, irregular
-from drillctrl.designs.drilling import (
-    Swing,
-    controlled_swings,
-    cost_of_gains,
-    measured_swings,
-    swing_families,
-)
+from drillctrl.designs.controlled_swings import controlled_swings
+from drillctrl.designs.motion_design import NONE_HELP
 from drillctrl.designs.quieter import quieter
+from drillctrl.designs.swings import Swing, cost_of_gains, measured_swings, swing_families
 from drillctrl.designs.trials import STARTS, Trial, trial_run
 from drillctrl.designs.verdict import Verdict, judge
 from drillctrl.motion.torsion import torsional_modes
@@ -234,6 +230,16 @@ def test_nothing_is_recommended_where_nothing_helps(capsys, monkeypatch):
     assert {change["kind"] for change in fields["quieter"]} == {"speed", "feed"}
     for change in fields["quieter"]:
         assert change["swing"] <= 0.3
+
+
+def test_gains_that_are_none_are_called_so(monkeypatch):
+    """Stiffness alone cannot damp; runs from irregular motion differ by chance, not by its gain."""
+    monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
+    monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (1.0,))
+    found = design(at(60, 20), "p", objective=Drilling())
+    assert abs(found.K1.item()) < 1e-6 * 10.0
+    assert found.verdict.refused
+    assert found.verdict.reason == NONE_HELP
 
 
 def test_a_quieter_motion_is_the_nearest_that_runs_show():

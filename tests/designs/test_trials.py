@@ -109,7 +109,15 @@ def test_gains_of_least_abscissa_refused(rpm, rop, structure, ends):
 def test_stabilising_gains_recommended(point, structure):
     result = design(point, structure)
     assert result.recommended is True
-    assert {trial.controlled.outcome for trial in result.trials} == {"settles"}
+    moving, standing = result.trials[: len(STARTS)], result.trials[len(STARTS) :]
+    assert {trial.controlled.outcome for trial in moving} == {"settles"}
+    assert [trial.start.name for trial in standing] == ["rest", "stick"]
+    # What such gains do to a bit that stands still is told with them.
+    worse = any(
+        trial.controlled.outcome == "turns-back" and trial.uncontrolled.outcome != "turns-back"
+        for trial in standing
+    )
+    assert ("switch them on once the bit turns" in result.verdict.reason) == worse
 
 
 def test_point_f_of_the_paper():
@@ -261,8 +269,9 @@ def test_settled_run_by_its_linear_decay():
     point = at(150, 20).operating_point()
     assert trial_duration(point) == pytest.approx(15.0 / point.kappa)
     found = uncontrolled_runs(point)
+    assert found.pop("stick").outcome == "turns-back"
     assert {name: f.outcome for name, f in found.items()} == dict.fromkeys(
-        [start.name for start in STARTS], "settles"
+        [*(start.name for start in STARTS), "rest"], "settles"
     )
     assert all(f.swing < 1e-3 and f.feed == pytest.approx(1.0, abs=1e-3) for f in found.values())
 

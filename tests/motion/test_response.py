@@ -28,7 +28,8 @@ from drillctrl import (
     torsional_threshold,
 )
 from drillctrl.drilling.case import as_case
-from drillctrl.motion.report import along_fields, along_summary, motion_fields
+from drillctrl.motion.along_report import along_fields, along_summary
+from drillctrl.motion.report import motion_fields
 from drillctrl.motion.torsion import forced_speed, ripple_of
 from drillctrl.simulation.status import Outcome
 from tests.motion.fixed_step import fixed_step_response

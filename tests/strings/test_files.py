@@ -1,8 +1,20 @@
 """Rig files that hold a string, and what they are refused for."""
 
+import dataclasses
+
 import pytest
 
-from drillctrl import DriveMachine, InputError, load_rig, read_tally, string_preset
+from drillctrl import (
+    DriveMachine,
+    InputError,
+    changed_rig,
+    cli,
+    load_rig,
+    read_tally,
+    save_rig,
+    string_preset,
+)
+from drillctrl.strings.rig import WeightControl
 
 BIT = """
 [bit]
@@ -148,3 +160,26 @@ def test_a_wrong_tally_is_refused(tmp_path, text, message):
     with pytest.raises(InputError, match="must be") as caught:
         read_tally(written(tmp_path, text, "tally.csv"))
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["paper-string", "vertical-3000", "deep-5000"])
+def test_a_saved_string_loads_as_it_was(tmp_path, name):
+    for rig in (string_preset(name), changed_rig(string_preset(name), depth=2345.6789, mud=1357.9)):
+        fed = dataclasses.replace(rig, weight_control=WeightControl(30e3, 1e-7))
+        for each in (rig, fed):
+            save_rig(each, tmp_path / "rig.toml")
+            assert load_rig(tmp_path / "rig.toml") == each
+
+
+def test_a_file_of_ones_own_begins_as_a_preset(tmp_path, capsys):
+    path = tmp_path / "my-rig.toml"
+    for source in ("vertical-3000", path):
+        with pytest.raises(SystemExit) as stop:
+            cli.main(["rig", "check", str(source), "--out", str(path)])
+        assert stop.value.code == 0
+        said = capsys.readouterr().out
+        assert "drill pipe: 2726.4 m" in said
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["rig", "check", "table1", "--out", str(tmp_path / "rig.json")])
+    assert stop.value.code == 2
+    assert "--out = " in capsys.readouterr().err

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from drillctrl import InputError
+from drillctrl import InputError, cli, save_table
 from drillctrl.tables.export_st import bench_name, export_st
 from drillctrl.tables.reserved import is_identifier
 
@@ -86,6 +86,41 @@ def test_a_recorded_motion_is_replayed(small, on_rig, tmp_path):
     for wrong in (motion[:, 0], np.zeros((0, 1)), motion.repeat(3, axis=1), np.nan * motion):
         with pytest.raises(InputError, match="motion = "):
             export_st(on_rig, tmp_path / "other.st", motion=wrong, **GIVEN)
+    assert not list(tmp_path.glob("other*"))
+
+
+def test_a_motion_from_a_file_is_replayed_where_it_was_recorded(small, tmp_path, capsys):
+    """At half of the period that it was recorded with, and under the other words for time."""
+    save_table(small, tmp_path / "gains.csv")
+    times = 0.02 * np.arange(30)
+    columns = {
+        "omega0": 9.0 + times, "psi": 14.0 + 0.0 * times, "note": times, "times": times,
+        "theta": 0.02 * np.sin(3.0 * times), "delta0": 2.0 + times, "delay": 0.15 + 0.01 * times,
+    }  # fmt: skip
+    rows = [",".join(columns), *(",".join(map(repr, row)) for row in
+                                 np.column_stack([*columns.values()]).tolist())]  # fmt: skip
+    (tmp_path / "motion.csv").write_text("# by hand\n" + "\n".join(rows) + "\n")
+    given = ["--from", str(tmp_path / "gains.csv"), "--period", "0.01", "--limit", "3"]
+    asked = ["table", *given, "--motion", str(tmp_path / "motion.csv")]
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*asked, "--out", str(tmp_path / "drill.st")])
+    assert stop.value.code == 0, capsys.readouterr()
+    found = rows_of(tmp_path / "drill.vectors.csv")
+    at = 0.01 * np.arange(59)
+    for name in ("omega0", "delta0", "psi", "theta", "delay"):
+        expected = np.interp(at, times, columns[name])
+        assert [float(row[name]) for row in found] == pytest.approx(expected.tolist(), rel=1e-12)
+    block, bench = ((tmp_path / f"{name}.st").read_text() for name in ("drill", "drill_bench"))
+    assert finished(block + bench, len(found) + 1).PASSED
+    for old, new in (("theta", "phi"), ("0.02,", "-0.02,"), ("0.02,", "nan,"), (",", ";")):
+        (tmp_path / "motion.csv").write_text("\n".join(rows).replace(old, new))
+        with pytest.raises(SystemExit) as stop:
+            cli.main([*asked, "--out", str(tmp_path / "other.st")])
+        assert stop.value.code == 2
+        assert "drillctrl: --motion = " in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*asked, "--out", str(tmp_path / "other.c")])
+    assert stop.value.code == 2
     assert not list(tmp_path.glob("other*"))
 
 

@@ -57,8 +57,9 @@ def place_of(history, steps, time):
 def take_sample(settings, history, steps, ints, reals, t, y):
     """Switch whatever is due at t; return whether anything was.
 
-    A sample reads the outputs (a measurement delay ago), commands within the limits, and is
-    held in y. The delayed outputs come from the record of earlier samples' instants.
+    A sample reads the outputs (a measurement delay ago), and its command is held in y; limits of
+    torque are kept where it acts. The delayed outputs come from the record of earlier samples'
+    instants.
     """
     due = False
     piece = piece_at(settings.drive[:, DRIVE_T], t)
@@ -93,9 +94,10 @@ def take_sample(settings, history, steps, ints, reals, t, y):
     add_earlier(settings, history, 0, gains, (t_now, j_now, s_now), sample, y)
     add_earlier(settings, history, 1, gains, (t_now - lag, j_then, s_then), earlier, y)
     for i in range(m):
-        u, before = within(y[held + m + i], settings.real[LIMITS + i]), y[held + i]
-        if settings.whole[ACTUATOR] == 0:
-            step = settings.real[LIMITS + m + i] * period
+        u, before = y[held + m + i], y[held + i]
+        step = settings.real[LIMITS + m + i] * period
+        if settings.whole[ACTUATOR] == 0 and np.isfinite(step):
+            u = within(u, settings.real[LIMITS + i])
             u = min(max(u, before - step), before + step)
         y[held + i] = u
     ints[SAMPLE] = sample + 1

@@ -39,9 +39,11 @@ NEAR, FAR, LATE, DELAYS = 0, 1, 2, 5
 # Entries of ``Settings.whole``: sizes of the plant, switches, and from ROWS on the matrix.
 STATES, INPUTS, OUTPUTS = 0, 1, 2
 # PAST: there are gains on delayed outputs; BACKWARDS: whether a bit may turn back; FED: place of
-# the list of outputs that are fed back.
+# the list of outputs that are fed back; PIVOT: rows whose rates others are told by, -1 for none.
 (LINEAR, MULTIPLE, FEEDBACK, PAST, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK, BACKWARDS,
- FED, ROWS) = range(3, 14)  # fmt: skip
+ FED, PIVOT) = range(3, 14)  # fmt: skip
+PIVOTS = 3
+ROWS = PIVOT + PIVOTS
 # Entries of ``Settings.real``. Weight and torque on bit and depth of cut in steady drilling;
 # what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1].
 WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
@@ -106,7 +108,7 @@ def history_width(states: int, inputs: int) -> int:
 
 def vector_length(states: int, inputs: int) -> int:
     """Return the length of the vector that the march moves; see `Settings`."""
-    return states + 3 * inputs + 6
+    return states + 4 * inputs + 6 + PIVOTS
 
 
 class Settings(NamedTuple):
@@ -115,10 +117,12 @@ class Settings(NamedTuple):
     The motion is X' = A X + B u + T top + E (load − steady), of which X starts with x, x',
     θ, θ' of the bit, and the outputs are C X − R top. All of it acts on one vector,
 
-        y = (X, actuators, held outputs of a sampled controller, u, top, load − steady),
+        y = (X, actuators, held commands, u, top, load − steady, beyond, pivots),
 
-    of length n + m + m + m + 4 + 2, so that A, B, T, E, C and R are the rows of one sparse
-    matrix. In the linear model the bit's state a delay ago takes the place of top.
+    of length n + m + m + m + 4 + 2 + m + 3, so that A, B, T, E, C and R are the rows of one
+    sparse matrix. In the linear model the bit's state a delay ago takes the place of top.
+    ``beyond`` is by how much commands exceed their limits. ``pivots`` are the rates of the
+    bit's and the top's speeds: the modes of a string follow these, and share the rest.
 
     Attributes
     ----------

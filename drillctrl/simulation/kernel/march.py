@@ -36,6 +36,7 @@ from .data import (
     NOT_FINITE,
     P_ROOM,
     PAUSED,
+    PIVOTS,
     RATE_FEEDBACK,
     RESUME,
     REVERSE,
@@ -92,7 +93,7 @@ def mode_of(ints, reals, chain):
 def workplace(settings):
     """Arrays of the size of the plant."""
     n, m = settings.whole[STATES], settings.whole[INPUTS]
-    probes, length = P_ROOM + 3 * m, n + 3 * m + 6
+    probes, length = P_ROOM + 3 * m, n + 4 * m + 6 + PIVOTS
     return Work(
         np.zeros((STAGES + 1, n + m)),
         np.zeros((STAGES + 1, probes + 2)),

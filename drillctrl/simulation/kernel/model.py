@@ -37,6 +37,8 @@ from .data import (
     P_WEIGHT,
     PAST,
     PAST_AGE,
+    PIVOT,
+    PIVOTS,
     QUARTIC,
     REVERSE,
     ROWS,
@@ -180,10 +182,10 @@ def feed_back(settings, history, steps, mode, t, y, place, out, probe):
     """Write the inputs to the plant at t: commands, or actuators that follow with a lag (Eq. 36).
 
     Commands and rates of actuators are held within their limits here; the probe takes what
-    is left of these, so that an event can meet them.
+    is left of these, so that an event can meet them, and y what the commands are beyond them.
     """
     n, m, real = settings.whole[STATES], settings.whole[INPUTS], settings.real
-    u = n + 2 * m
+    u, beyond = n + 2 * m, n + 3 * m + 6
     for i in range(m):
         y[u + i] = 0.0
     if mode.on == 1:
@@ -192,6 +194,7 @@ def feed_back(settings, history, steps, mode, t, y, place, out, probe):
         wanted = y[u + i]
         probe[P_ROOM + i] = real[LIMITS + i] - abs(wanted)
         value = within(wanted, real[LIMITS + i])
+        y[beyond + i] = wanted - value
         if settings.whole[ACTUATOR] == 1:
             slew = (value - y[n + i]) / settings.real[LAG_TIME]
             probe[P_ROOM + m + i] = real[LIMITS + m + i] - abs(slew)
@@ -245,9 +248,11 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     probe[P_DEPTH], probe[P_DELAY] = d, delay
     excess = n + 3 * settings.whole[INPUTS] + 4
     y[excess], y[excess + 1] = 0.0, 0.0
+    axial = row_of(settings.whole, settings.value, 1, y)
+    angular = row_of(settings.whole, settings.value, 3, y)
     weight, torque = bit_load(
-        row_of(settings.whole, settings.value, 1, y),
-        row_of(settings.whole, settings.value, 3, y),
+        axial,
+        angular,
         strength * d,
         rates(state, bit),
         mode.contact,
@@ -260,14 +265,29 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     )
     y[excess] = weight - settings.real[WEIGHT]
     y[excess + 1] = torque - settings.real[TORQUE]
-    for i in range(n):
-        out[i] = row_of(settings.whole, settings.value, i, y)
     # What is held does not move by rounding either.
-    if mode.torsion == STUCK:
-        out[3] = 0.0
-    if mode.contact == 1 and mode.axial == HELD:
-        out[1] = 0.0
+    held = mode.contact == 1 and mode.axial == HELD
+    out[1] = 0.0 if held else axial + settings.real[BY_WEIGHT] * y[excess]
+    out[3] = 0.0 if mode.torsion == STUCK else angular + settings.real[BY_TORQUE] * y[excess + 1]
+    move(settings, y, out)
     return True
+
+
+@inner
+def move(settings, y, out):
+    """Write the rates of all states but x' and θ', whose rates are known."""
+    whole, value = settings.whole, settings.value
+    n = whole[STATES]
+    place = n + 4 * whole[INPUTS] + 6
+    for k in range(PIVOTS):
+        row = whole[PIVOT + k]
+        if row > 3:
+            out[row] = row_of(whole, value, row, y)
+        if row >= 0:
+            y[place + k] = out[row]
+    out[0], out[2] = row_of(whole, value, 0, y), row_of(whole, value, 2, y)
+    for i in range(4, n):
+        out[i] = row_of(whole, value, i, y)
 
 
 @entry
@@ -335,8 +355,9 @@ def linear_rate(settings, history, steps, mode, t, y, out, probe):
     y[then], y[then + 1], y[then + 2], y[then + 3] = state_at(history, j, s)
     if settings.whole[FEEDBACK] == 1:
         feed_back(settings, history, steps, mode, t, y, (t - lag, j, s), out, probe)
-    for i in range(n):
-        out[i] = row_of(settings.whole, settings.value, i, y)
+    out[1] = row_of(settings.whole, settings.value, 1, y)
+    out[3] = row_of(settings.whole, settings.value, 3, y)
+    move(settings, y, out)
     d = settings.real[CUT] + row_of(settings.whole, settings.value, n + settings.whole[OUTPUTS], y)
     probe[P_DEPTH], probe[P_DELAY], probe[P_PRESSED] = d, lag, 1.0
     return True

@@ -118,11 +118,15 @@ def attempt(settings, history, steps, mode, t, h, y, work):
     for i in range(n + m, n + 2 * m):
         new[i] = y[i]
     for stage in range(1, STAGES):
+        # Along the states, which stand side by side.
         for i in range(size):
-            total = 0.0
-            for q in range(stage):
-                total += WEIGHTS[stage, q] * k[q, i]
-            increment[i] = h * total
+            increment[i] = WEIGHTS[stage, 0] * k[0, i]
+        for q in range(1, stage):
+            weight = WEIGHTS[stage, q]
+            for i in range(size):
+                increment[i] += weight * k[q, i]
+        for i in range(size):
+            increment[i] *= h
             new[i] = y[i] + increment[i]
         known = rate_of_change(
             settings, history, steps, mode, t + NODES[stage] * h, new, k[stage], stages[stage]

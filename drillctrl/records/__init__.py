@@ -1,0 +1,1 @@
+"""What a rig has recorded: read, looked at, and a string fitted to it."""

@@ -1,0 +1,141 @@
+"""Families of torsional lines that a recording can be fitted with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drillctrl.drilling.rig import Rig
+from drillctrl.strings.line import Line, Piece, Stretch
+from drillctrl.strings.rig import StringRig
+
+# A disc is a piece of so many times the spring's stiffness.
+_RIGID = 1e7
+_LENGTH = 200.0
+
+
+@dataclass(frozen=True)
+class Family:
+    """Lines by parameters that are all positive.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the parameters.
+    start, low, high : tuple of float
+        First guess and bounds.
+    base : Line or None
+        What is scaled; None of pipe above a disc of which nothing is known.
+    lumped : (float, float)
+        Stiffness and inertia of the base lumped to one spring and disc.
+    """
+
+    names: tuple[str, ...]
+    start: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    base: Line | None = None
+    lumped: tuple[float, float] = (0.0, 0.0)
+
+    def line(self, values: Sequence[float]) -> Line:
+        """Return the line of some values of the parameters."""
+        if self.base is None:
+            stiffness, pipe, disc, damping = values
+            return pipe_and_disc(stiffness, pipe, disc, damping)
+        stiffer, heavier, damping = values
+        return scaled(self.base, stiffer, heavier, damping)
+
+    def effective(self, values: Sequence[float]) -> tuple[float, float]:
+        """Return stiffness and inertia of one spring and disc instead, N m/rad and kg m²."""
+        if self.base is None:
+            return float(values[0]), float(values[2] + values[1] / 3.0)
+        return float(values[0] * self.lumped[0]), float(values[1] * self.lumped[1])
+
+
+def scaled(line: Line, stiffer: float, heavier: float, damping: float) -> Line:
+    """Return a line stiffer and heavier by factors, with another viscous damping, 1/s."""
+    return Line(
+        tuple(
+            Stretch(
+                tuple(_changed(piece, stiffer, heavier, damping) for piece in stretch.pieces),
+                stretch.repeats,
+            )
+            for stretch in line.stretches
+        )
+    )
+
+
+def _changed(piece: Piece, stiffer: float, heavier: float, damping: float) -> Piece:
+    """Return a piece with other numbers; see `scaled`."""
+    mass = heavier * piece.mass
+    return piece._replace(mass=mass, stiffness=stiffer * piece.stiffness, damping=damping * mass)
+
+
+def pipe_and_disc(stiffness: float, pipe: float, disc: float, damping: float) -> Line:
+    """Return uniform pipe above a disc.
+
+    Parameters
+    ----------
+    stiffness : float
+        Of the whole pipe, N m/rad.
+    pipe, disc : float
+        Inertias, kg m²; that of the pipe may be zero.
+    damping : float
+        Viscous, of both, 1/s.
+    """
+    # Any length will do; finite elements are made of some metres.
+    mass = pipe / _LENGTH
+    upper = Piece(_LENGTH, mass, stiffness * _LENGTH, damping * mass)
+    lower = Piece(1.0, disc, _RIGID * stiffness, damping * disc)
+    return Line((Stretch((upper,)), Stretch((lower,))))
+
+
+def line_of(rig: Rig) -> Line:
+    """Return the torsional line of a rig: its string's, or a spring and a disc."""
+    if isinstance(rig, StringRig):
+        return rig.string.torsion
+    rate = rig.torsional_damping / rig.inertia
+    return pipe_and_disc(rig.torsional_stiffness, 0.0, rig.inertia, rate)
+
+
+def damping_of(line: Line) -> float:
+    """Return the viscous damping of a line over its inertia, 1/s."""
+    pieces = [stretch.mean() for stretch in line.stretches]
+    inertia = sum(piece.length * piece.mass for piece in pieces)
+    return float(sum(piece.length * piece.damping for piece in pieces) / inertia)
+
+
+def family_of(rig: Rig) -> Family:
+    """Return a rig's own line, up to 60 % stiffer or heavier, or as much less."""
+    line = line_of(rig)
+    start = max(damping_of(line), 1e-3)
+    return Family(
+        ("stiffness", "inertia", "damping"),
+        (1.0, 1.0, start),
+        (1.0 / 1.6, 1.0 / 1.6, 1e-4),
+        (1.6, 1.6, 5.0),
+        line,
+        (rig.torsional_stiffness, rig.inertia),
+    )
+
+
+def unknown_family(stiffness: float, inertia: float, share: float) -> Family:
+    """Return pipe above a disc about a first guess.
+
+    Parameters
+    ----------
+    stiffness, inertia : float
+        Of the string lumped to one disc (a third of the pipe counted to it).
+    share : float
+        Inertia of the pipe over that of the disc.
+    """
+    disc = inertia / (1.0 + share / 3.0)
+    start = (stiffness, share * disc, disc, 0.1)
+    return Family(
+        ("stiffness", "pipe_inertia", "disc_inertia", "damping"),
+        start,
+        tuple(np.array([0.3, 0.02, 0.1, 1e-3]) * (*start[:1], start[2], start[2], 1.0)),
+        tuple(np.array([3.0, 20.0, 5.0, 50.0]) * (*start[:1], start[2], start[2], 0.1)),
+    )
