@@ -76,8 +76,11 @@ def _top_end(rig: StringRig, language: Language) -> str:
     if ropes is not None:
         fed = f"ropes of {language.text('axial_stiffness', ropes, 5)}"
     if rig.weight_control is not None:
-        gain = language.text("axial_rate", 1e3 * rig.weight_control.feed_gain, 3)
-        fed = f"fed by weight, {gain} per kN"
+        gain = rig.weight_control.feed_gain * 3.6e6
+        fed = f"fed by weight, {gain:.3g} m/h per kN"
+        if language is FIELD:
+            ratio = language.number("axial_rate", 1.0) / language.number("force", 1.0)
+            fed = f"fed by weight, {rig.weight_control.feed_gain * ratio:.3g} ft/h per klbf"
     return f"{turned}, {fed}"
 
 
