@@ -22,6 +22,7 @@ from drillctrl.cli.scenario import (
 from drillctrl.cli.verb import Command, Verb, naming, with_options
 
 if TYPE_CHECKING:
+    from drillctrl.drilling.plant import Plant
     from drillctrl.hardware.client import Law
     from drillctrl.hardware.result import BenchRun
     from drillctrl.hardware.wire import Address
@@ -143,7 +144,7 @@ def _benched(answer: str | None, options: dict[str, Any], line: dict[str, Any]) 
         for what in ("outputs", "inputs")
     }
     case, _ = bench_case(where)
-    table = _read_table(answer)
+    table = _read_table(answer, case.plant)
     if table is not None:
         names["outputs"] = names["outputs"] or table.structure.outputs
         names["inputs"] = names["inputs"] or table.structure.inputs
@@ -214,13 +215,13 @@ def _read_line(options: dict[str, Any], replayed: bool) -> dict[str, Any]:
     return line
 
 
-def _read_table(path: str | None) -> GainTable | None:
+def _read_table(path: str | None, plant: Plant | None = None) -> GainTable | None:
     if path is None:
         return None
     from drillctrl.tables.files import load_table
 
     with naming("--table", "table"):
-        return load_table(path)
+        return load_table(path, plant)
 
 
 def _check_signals(table: GainTable, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> None:

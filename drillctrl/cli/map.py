@@ -222,10 +222,12 @@ def _read_controller(
     for name, plain in (("activation", None), ("noise", ""), ("delay", "fixed")):
         if options[name] != plain:
             raise InputError(f"--{name}", options[name], "left out with --table on a map")
+    from drillctrl.drilling.case import as_case
     from drillctrl.tables.files import load_table
 
     surroundings = {name: options[name] for name in SURROUNDINGS}
-    return load_table(options["table"]), read_surroundings(surroundings, rig)
+    table = load_table(options["table"], as_case(where).plant)
+    return table, read_surroundings(surroundings, rig)
 
 
 def _finish(checkpoint: Checkpoint) -> None:

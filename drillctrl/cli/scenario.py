@@ -273,7 +273,7 @@ def read_controller(
         for name, value in (("structure", structure), ("K1", now), ("K2", past)):
             if value is not None:
                 raise InputError(f"--{name}", value, "left out where --table gives the gains")
-        return _from_table(options["table"], point, scenario, duration, given)
+        return _from_table(options["table"], where, point, scenario, duration, given)
     if structure is None:
         lonely = {"K1": now, "K2": past, **given}
         for name, value in lonely.items():
@@ -291,12 +291,18 @@ def read_controller(
 
 
 def _from_table(
-    path: str, point: OperatingPoint, scenario: Scenario, duration: float, given: dict[str, Any]
+    path: str,
+    where: OperatingPoint | RigPoint,
+    point: OperatingPoint,
+    scenario: Scenario,
+    duration: float,
+    given: dict[str, Any],
 ) -> Controller:
+    from drillctrl.drilling.case import as_case
     from drillctrl.tables.files import load_table
     from drillctrl.tables.scheduling import places_of, scheduled
 
-    table = load_table(path)
+    table = load_table(path, as_case(where).plant)
     ends = [change.time + change.duration for change in scenario.changes]
     instants = [0.0, *(end for end in ends if end <= duration)]
     import numpy as np
