@@ -13,7 +13,7 @@ from drillctrl.records.surface import Carrier
 from drillctrl.strings.line import Line
 
 # What is less well known than this is not known (95 %, relative).
-_KNOWN = 0.25
+_KNOWN = 0.34
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Estimate:
 
     @property
     def known(self) -> bool:
-        """Whether the record says it to a quarter."""
+        """Whether the record says it to a third."""
         return self.relative < _KNOWN
 
     def to_dict(self) -> dict[str, Any]:
@@ -82,7 +82,7 @@ class RecordFit:
     misfit, misfit_kept_back : float
         Mean distance of the bit from its law in both, in units of what noise explains.
     identifiable : bool
-        Whether stiffness and inertia are known to a quarter, and so the string.
+        Whether stiffness and inertia are known to a third, and so the string.
     reasons : tuple of str
         What the record does not say, and why.
     """
