@@ -219,8 +219,8 @@ def test_what_cannot_have_late_channels_says_so(many):
 def exchanger():
     """A heated body, a cooler and two long pipes, with the sum of the error.
 
-    After Vyhlídal, Zítek and Paulů, whose set-up has this structure: delays in the states up to
-    40 s, and one of 13.2 s at the input.
+    Delays in the states up to 40 s and one of 13.2 s at the input; the other numbers are made up
+    in the manner of such set-ups.
     """
     terms = {tau: np.zeros((5, 5)) for tau in (0.0, 2.8, 6.5, 9.2, 13.0, 18.0, 40.0)}
     terms[0.0][1:3, :3] = [[1.0 / 3.0, -2.0 / 3.0, 0.0], [0.0, 0.0, -1.0 / 3.0]]
@@ -258,7 +258,7 @@ def test_a_late_input_before_six_other_delays(exchanger):
 
 
 def test_a_gain_behind_a_late_input_is_designed_for(exchanger):
-    """One gain: the best of a thousand, each judged by its roots, is no better."""
+    """One gain: the best of 401 over its range is no better."""
     plant, *_ = exchanger
     low, none = np.array([[0.0, 0.0, 0.0, 0.0, 0.0]]), np.zeros((1, 5))
     high = np.array([[0.0, 0.0, 0.0, 0.0, 1.0]])
