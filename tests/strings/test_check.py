@@ -123,7 +123,7 @@ def test_the_picture_shows_every_section_and_mode(capsys, tmp_path):
     figure = plot_rig(check_rig(string_preset("vertical-3000")))
     string, torsional, axial = figure.axes
     assert {text.get_text() for text in string.texts} == {
-        "drill pipe", "heavy-weight", "collars", "bit"
+        "drill pipe", "heavy-weight", "collars", "bit", "top drive"
     }  # fmt: skip
     for ax in (torsional, axial):
         curves = [line for line in ax.lines if len(line.get_xdata()) > 2]
