@@ -9,14 +9,17 @@ import types
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from drillctrl.base.errors import InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
-# What is looked at when it is read as a number or an array, with the range that is permitted.
-_READ_LATER = (bool, int, float, complex, object)
+# Of kinds that are not ours, those whose values can be told at once: numbers and arrays are read
+# later, with the range that is permitted, and what other libraries do their work with may be any
+# object that does the same.
+_TOLD = (str, types.NoneType, Path, collections.abc.Mapping, collections.abc.Callable)
 _SEQUENCES = (collections.abc.Sequence, tuple, list)
 
 
@@ -100,7 +103,9 @@ def _parts(kind: Any) -> tuple[Any, ...]:
 
 def _binds(part: Any) -> bool:
     """Whether values can be told to be of a kind."""
-    return isinstance(part, type) and part not in _READ_LATER and not hasattr(part, "_is_protocol")
+    if not isinstance(part, type) or hasattr(part, "_is_protocol"):
+        return False
+    return part in _TOLD or part in _SEQUENCES or part.__module__.startswith("drillctrl.")
 
 
 _WORDS: dict[Any, str] = {

@@ -49,7 +49,9 @@ def _changed(rig: Rig, depth: float | None, mud: float | None) -> StringRig:
 
 @functools.lru_cache(maxsize=256)
 def _hung(known: StringAtBit, rig: Rig, depth: float) -> StringAtBit:
-    return replace(known, string=string_of(_changed(rig, depth, None)))
+    # The groups of a changed rig are in units of its own string.
+    string = string_of(_changed(rig, depth, None))
+    return replace(known, string=string, units=string)
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,7 +97,7 @@ def _of_fit(rig: str | None) -> dict[str, float]:
     sizes = fitted_box(errors)
     told = ", ".join(f"{name} by {100.0 * size:.1f} %" for name, size in sizes.items())
     click.echo(f"drillctrl: note: the box is that of the fitted rig: {told}", err=True)
-    return {option: sizes[name] for option, name in _ERRORS.items()}
+    return {option: sizes[name] for option, name in _ERRORS.items() if name in sizes}
 
 
 def read_objective(options: dict[str, Any]) -> Objective | None:

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from drillctrl.base.errors import InputError
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.layout import check_start
 from drillctrl.simulation.outcome import (
     Figures,
     figures,
@@ -17,6 +19,7 @@ from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.starts import Start, start_named
 from drillctrl.simulation.status import Outcome
+from drillctrl.simulation.structure import structure_of
 
 # How long a run is: this many times the decay time of the torsional mode's own damping, of
 # which the bit takes half or more away, so that what a start has left is below the swing
@@ -105,11 +108,24 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
     )
 
 
-def uncontrolled_runs(
-    where: Where, starts: Sequence[Start] = (*STARTS, *STANDING)
-) -> dict[str, Figures]:
+def standing_starts(case: Case) -> tuple[Start, ...]:
+    """Return those of `STANDING` that the string of a case can be in."""
+    _, point = case.physics("a trial")
+    structure, found = structure_of(case), []
+    for start in STANDING:
+        try:
+            check_start(point, structure, start.scenario(point), False)
+        except InputError:
+            # A drive that is free to turn holds nothing.
+            continue
+        found.append(start)
+    return tuple(found)
+
+
+def uncontrolled_runs(where: Where) -> dict[str, Figures]:
     """Return what becomes of every start without control, by its name."""
     case = as_case(where)
+    starts = (*STARTS, *standing_starts(case))
     return {start.name: trial_run(case, None, start) for start in starts}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.trials import STANDING, Trial, trial_runs
+from drillctrl.designs.trials import Trial, standing_starts, trial_runs
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
@@ -102,7 +102,7 @@ def try_gains(
     verdict = judge(trials, stable)
     if spare or not verdict.recommended:
         return verdict
-    standing = trial_runs(case, controller, uncontrolled=uncontrolled, starts=STANDING)
+    standing = trial_runs(case, controller, uncontrolled=uncontrolled, starts=standing_starts(case))
     return with_engagement(verdict, standing, "switch them on once the bit turns")
 
 

@@ -35,8 +35,9 @@ def result_lines(result: AnalysisValues) -> Lines:
 
 
 def _answer_lines(result: AnalysisValues) -> Lines:
-    """Say first, of a rig, what becomes of small vibration."""
-    if (rig := result.case.told_rig) is None:
+    """Say first, of a rig, what becomes of small vibration; of gains that were tried, runs say."""
+    rig = result.case.told_rig
+    if rig is None or result.verdict.trials:
         return []
     rate = result.loop.spectral_abscissa / rig.time_scale
     hertz = abs(result.loop.dominant_roots[0].value.imag) / (2.0 * math.pi * rig.time_scale)

@@ -163,18 +163,20 @@ def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatAr
     """
     n = arrays.A.shape[0]
     c = Coefficients(*arrays.q[: len(Coefficients._fields)])
-    # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known.
-    fixed = np.array([0, 1, 2, 3])
-    free = np.arange(4, n)
-    unknown = np.hstack([arrays.A[:, free], arrays.E])
+    # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known: both powers of
+    # t at once, since a state that integrates takes its rate from the other.
+    fixed, free = np.arange(4), np.arange(4, n)
     b, a = np.zeros(n), np.zeros(n)
     b[[0, 2]] = a[[1, 3]] = -c.penetration_rate, -c.rotary_speed
-    for values, rate in ((b, np.zeros(n)), (a, b)):
-        wanted = rate - arrays.A[:, fixed] @ values[fixed]
-        found, *_ = np.linalg.lstsq(unknown, wanted, rcond=None)
-        if not np.allclose(unknown @ found, wanted, rtol=0.0, atol=1e-8 * abs(wanted).max()):
-            raise InputError("start", "stick", "steady where the string has no such motion")
-        values[free] = found[: free.size]
+    loaded = np.hstack([arrays.A[:, free], arrays.E])
+    own = np.hstack([np.eye(n)[:, free], np.zeros_like(arrays.E)])
+    unknown = np.block([[loaded, np.zeros_like(loaded)], [-own, loaded]])
+    wanted = -np.concatenate([arrays.A[:, fixed] @ b[fixed], arrays.A[:, fixed] @ a[fixed] - b])
+    found, *_ = np.linalg.lstsq(unknown, wanted, rcond=None)
+    if not np.allclose(unknown @ found, wanted, rtol=0.0, atol=1e-8 * abs(wanted).max()):
+        raise InputError("start", "stick", "steady where the string has no such motion")
+    rates, places = np.split(found, 2)
+    b[free], a[free] = rates[: free.size], places[: free.size]
     return a, a + time * b
 
 

@@ -172,7 +172,7 @@ def test_command_line(capsys):
     [
         (("vertical-3000", "speed=60:180 rpm", "rop=5:40 m/h"), "free to turn"),
         (("paper-string", "depth=100:4000 m", "rop=5:40 m/h"), r"lower limit, m\) = 100"),
-        (("paper-string", "mud=1000:4000 kg/m3", "rop=5:40 m/h"), r"upper limit, kg/m\^3\) = 4000"),
+        (("paper-string", "mud=1000:4000 kg/m3", "rop=5:40 m/h"), r"upper limit, kg/m³\) = 4000"),
         (("table1", "depth=1000:4000 m", "rop=5:40 m/h"), "a string of sections"),
     ],
 )

@@ -189,8 +189,8 @@ def test_gain_units_come_from_what_signals_measure():
         (lambda: Stribeck(drop=np.nan), "drop = nan"),
         (lambda: paper_plant(bit=TopDrive()), "bit = TopDrive: must be a BitRock"),
         (lambda: paper_plant(blocks=(TopDrive(), TopDrive())), "inertia_ratio"),
-        (lambda: as_case("C"), "point = str"),
-        (lambda: as_case(OperatingPoint(1, 1, 1), 3), "plant = int"),
+        (lambda: as_case("C"), "where = 'C'"),
+        (lambda: as_case(OperatingPoint(1, 1, 1), 3), "plant = 3"),
         (lambda: as_case(OperatingPoint(1, 1, 1)).with_changes(drop=1.0), "parameter = drop"),
         (lambda: String({"theta": "angle"}, [[1]], [[1]], [[1]]), "x and theta first"),
         (

@@ -27,6 +27,7 @@ def rigs(draw):
 def assert_same_rig_point(one, two):
     a, b = dataclasses.asdict(one), dataclasses.asdict(two)
     assert a.pop("rig") == pytest.approx(b.pop("rig"), rel=1e-12)
+    assert a.pop("units") == b.pop("units")
     assert a == pytest.approx(b, rel=1e-12)
 
 

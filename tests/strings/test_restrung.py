@@ -114,10 +114,10 @@ def test_a_table_over_depth_holds_for_each_string(tmp_path):
     assert again.gains_at(*place)[0] == pytest.approx(made.gains[1][0])
 
 
-def test_one_thing_varies_in_the_place_of_the_rock():
+def test_what_varies_first_stands_in_the_place_of_the_rock():
     two = Axis("depth", (1150.0, 1200.0)), Axis("mud", (1000.0, 1200.0))
-    with pytest.raises(InputError, match="mud"):
-        rig_grid(RIG, SPEED, penetration_rate=RATE, depth=two[0], mud=two[1])
+    grid = rig_grid(RIG, SPEED, penetration_rate=RATE, depth=two[0], mud=two[1])
+    assert [axis.name for axis in grid.axes[2:]] == ["depth", "mud"]
     grid = rig_grid(RIG, SPEED, penetration_rate=RATE, depth=1300.0, mud=two[1])
     assert grid.plant.string.string.length == pytest.approx(1300.0)
     assert [axis.name for axis in grid.axes] == ["rotary_speed", "penetration_rate", "mud"]
