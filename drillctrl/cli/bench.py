@@ -95,10 +95,10 @@ def bench_command(
 
     \b
     Examples:
-      drillctrl table --omega0 9:11:2 --delta0 2:3:2 --trials none --out gains.csv
+      drillctrl table --omega0 9:11:2 --delta0 2:3:2 --trials none --out answer.csv
       drillctrl bench --delta0 2.5 --duration 20 --speedup max --limit 5 \\
-          --table gains.csv --out run.csv
-      drillctrl bench --replay run.csv --limit 5 --table gains.csv
+          --table answer.csv --out run.csv
+      drillctrl bench --replay run.csv --limit 5 --table answer.csv
 
     Without --table it waits for a controller at its address: UDP on this machine alone, a datagram
     a sample, laid out as the guide says. Ctrl-C ends it with a report.
