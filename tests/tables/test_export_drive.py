@@ -369,8 +369,10 @@ def test_the_unit_is_valid_and_gives_the_same_torque(laws, tmp_path):
             str(path), start_time=0.0, stop_time=(count - 1) * law.period,
             step_size=law.period, output_interval=law.period, input=signals, output=["u"],
         )  # fmt: skip
-        # u after a step is the torque from its beginning on.
-        assert found["u"][1:] == pytest.approx(expected[: count - 1], rel=1e-12, abs=1e-9)
+        # u after a step is the torque from its beginning on; discrete inputs count from a step on
+        # or from the one before, by fmpy's version.
+        off = [np.abs(found["u"][1 + lag :] - expected[: count - 1 - lag]).max() for lag in (0, 1)]
+        assert min(off) < 1e-7 < max(off)
     with zipfile.ZipFile(path) as archive:
         told = archive.read("modelDescription.xml").decode()
     assert "trapezoidal rule" in told
