@@ -1,5 +1,6 @@
 """A page's server in a process of its own, as a user starts it."""
 
+import contextlib
 import http.client
 import json
 import os
@@ -9,6 +10,8 @@ import sys
 from dataclasses import dataclass
 
 import pytest
+
+from tests.interrupts import hears_interrupts
 
 
 @dataclass
@@ -34,10 +37,10 @@ class Server:
             headers.setdefault("Content-Length", str(len(body)))
         for name, value in headers.items():
             connection.putheader(name.replace("_", "-"), value)
-        connection.endheaders(body)
-        response = connection.getresponse()
-        text = response.read().decode()
-        connection.close()
+        with contextlib.closing(connection):
+            connection.endheaders(body)
+            response = connection.getresponse()
+            text = response.read().decode()
         return response.status, dict(response.getheaders()), text
 
     def send(self, question, **headers):
@@ -61,6 +64,7 @@ def server():
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        preexec_fn=hears_interrupts,
     )
     yield Server(process.stdout.readline().strip(), process)
     process.send_signal(signal.SIGINT)

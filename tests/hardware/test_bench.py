@@ -40,6 +40,7 @@ from drillctrl import (
 from drillctrl.hardware.client import table_law
 from drillctrl.hardware.wire import MAGIC, pack_answer, unpack_sample
 from drillctrl.simulation.stepping import SteppedRun
+from tests.interrupts import hears_interrupts
 
 from ..tables.exported import InC
 
@@ -379,7 +380,7 @@ def test_control_c_ends_it_with_a_report():
     with subprocess.Popen(
         [sys.executable, "-m", "drillctrl", *command],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        env={**os.environ, "PYTHONUNBUFFERED": "1"}, preexec_fn=hears_interrupts,
     ) as process:  # fmt: skip
         address = ("127.0.0.1", int(process.stderr.readline().rsplit(":", 1)[1].split()[0]))
         seen = threading.Event()

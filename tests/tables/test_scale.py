@@ -10,6 +10,7 @@ import pytest
 
 from drillctrl import InputError, cli, dimensionless_grid, linear_axis, load_table, table
 from drillctrl.base.checkpoint import Checkpoint
+from tests.interrupts import hears_interrupts
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
 # Trials are no part of a checkpoint.
@@ -200,13 +201,9 @@ def two_workers(tmp_path):
     """A command with two processes, and the processes, once both are at work."""
     program = [sys.executable, "-m", "drillctrl", *MANY, "gains.csv", "--workers", "2"]
 
-    # Whoever runs the tests in the background has interrupts ignored.
-    def listen():
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     run = subprocess.Popen(
-        program, cwd=tmp_path, start_new_session=True, preexec_fn=listen, **pipes
+        program, cwd=tmp_path, start_new_session=True, preexec_fn=hears_interrupts, **pipes
     )
     children = Path(f"/proc/{run.pid}/task/{run.pid}/children")
     checkpoint = tmp_path / "gains.csv.checkpoint"
