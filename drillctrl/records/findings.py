@@ -19,39 +19,7 @@ from drillctrl.records.swings import Period, Windows, window_means
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What a recording says; see `RecordStudy`.
-
-    Attributes
-    ----------
-    record : Record
-        As it was looked at.
-    period : Period or None
-        Of the swing; None where none keeps itself up.
-    swing : float or None
-        Stick-slip index of the bit, the median over windows; None where its speed is not known.
-    swing_from : str or None
-        ``"bit speed"`` measured, ``"surface"`` carried down.
-    severity, torque_severity : Windows or None
-        Index of the bit's speed and of the torque in windows of 20 s.
-    sticking : float or None
-        Share of the time in which the bit stands.
-    modes : tuple of Peak
-        Torsional modes.
-    modes_from : str or None
-        ``"fit"`` of a string, or peaks of the torque's ``"spectrum"``.
-    bit : Downhole or None
-        Carried down.
-    string_from : str or None
-        Which string carried: ``"fit"`` or ``"rig"``.
-    fit : RecordFit or None
-        The string that was fitted.
-    drive : DriveSeen or None
-        What the drive returns.
-    measured_error : float or None
-        Rms of carried less measured speed of the bit, rad/s, in the band.
-    notes : tuple of str
-        On the rows, the columns and what could not be told.
-    """
+    """What a recording says; `RecordStudy` tells what each value is."""
 
     record: Record
     period: Period | None

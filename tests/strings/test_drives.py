@@ -193,20 +193,20 @@ def test_what_a_drive_may_not_be():
 
 def test_second_order_stands_twice_what_soft_torque_does(second_order):
     """Over lengths of ±20 %, with a drive of 20 ms and a torque limit; each with its own soft."""
+    soft = rule_control("soft-torque", LATE, LONG)
+    known = min(mode.slope for mode in mode_slopes(LONG.torsion, soft, 4))
+    assert known == pytest.approx(36.6, abs=0.1)
     for length in np.linspace(2000.0, 3000.0, 5):
         string = long_string(length)
-        line, soft = string.torsion, rule_control("soft-torque", LATE, string)
-        known = min(mode.slope for mode in mode_slopes(line, soft, 4))
-        if length == 2500.0:
-            assert known == pytest.approx(36.6, abs=0.1)
+        line, own = string.torsion, rule_control("soft-torque", LATE, string)
         slopes = mode_slopes(line, second_order, 4)
         least = min(mode.slope for mode in slopes)
-        # Thrice and a half; which optimum a descent ends at is decided by rounding.
-        assert least > 2.0 * known
+        assert least > 3.3 * known
+        assert least > 2.0 * min(mode.slope for mode in mode_slopes(line, own, 4))
         assert count_growing(line, second_order) == 0
         # No root of these four modes grows up to there, however many samples missed.
-        end = 0.5 * (slopes[2].mode_frequency + slopes[3].mode_frequency)
-        assert count_growing(line, second_order, 0.9 * least, end) == 0
+        end = 4.5 * mode_slopes(line, None, 1)[0].mode_frequency
+        assert count_growing(line, second_order, 0.99 * least, end) == 0
     assert second_order.speed.excess == 0
     assert len(second_order.speed.poles) == 3
     assert drive_delay_margin(LONG.torsion, second_order) > 0.01
@@ -231,7 +231,7 @@ def test_second_order_by_roots_of_finite_elements(second_order):
     # A mode that no slope makes grow has no frequency to look at.
     for mode in (mode for mode in slopes if mode.frequency is not None):
         root = root_near(driven_string(line, second_order, mode.slope), 2j * np.pi * mode.frequency)
-        assert root == pytest.approx(2j * np.pi * mode.frequency, rel=1e-3)
+        assert root == pytest.approx(2j * np.pi * mode.frequency, rel=3e-4)
     assert least.frequency is not None
     assert only_turns_as_a_whole(driven_string(line, second_order))
 
