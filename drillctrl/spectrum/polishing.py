@@ -66,13 +66,14 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
         done |= stalled | square | (size <= 4 * EPSILON * scale)
         if done.all():
             break
-    rough = np.flatnonzero(done & (last > _ROUGH_STEP * (1.0 + np.abs(s))))
+    rough = np.flatnonzero(np.isfinite(s) & (~done | (last > _ROUGH_STEP * (1.0 + np.abs(s)))))
     if rough.size:
-        done[rough] = _are_roots(system, s[rough])
+        # Members of a multiple root may still move about it: where Δ is singular they are it.
+        done[rough] = are_roots(system, s[rough])
     return s, done
 
 
-def _are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
+def are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
     """Whether Δ is singular to rounding: of a multiple root more cannot be told."""
     rest = characteristic.smallest_singular(system, s)
     return np.asarray(rest <= _SINGULAR * characteristic.weight(system, s))
@@ -86,7 +87,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
         step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
         size, scale = abs(step), 1.0 + abs(s)
         if size >= last and size < 1e-3 * scale:
-            return s, size <= _ROUGH_STEP * scale or bool(_are_roots(system, np.array([s]))[0])
+            return s, size <= _ROUGH_STEP * scale or bool(are_roots(system, np.array([s]))[0])
         s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
         s = complex(s.real, abs(s.imag))
         last = size
