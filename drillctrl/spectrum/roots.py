@@ -73,12 +73,18 @@ def _apart(system: DelaySystem, depth: float, line: float | None) -> _Gathered |
     every = parts(system)
     if len(every) == 1 and every[0].delays == system.delays:
         return None
-    if line is None:
-        line = max(float(_gather(part, 0.0)[0][0].real) for part in every) - depth
-    s = np.concatenate([_gather(part, depth, line)[0] for part in every])
+    try:
+        found = [_gather(part, depth, line) for part in every]
+    except UndecidedError:
+        return None
+    s = np.concatenate([found_there for found_there, _, _ in found])
+    floor = line
+    if floor is None:
+        floor = max(float(s.real.max()) - depth, *(lowest for *_, lowest in found))
+    s = s[s.real >= floor]
     if not are_roots(system, s).all():
         return None
-    return s[np.argsort(-s.real, kind="stable")], np.ones(s.size, dtype=bool), line
+    return s[np.argsort(-s.real, kind="stable")], np.ones(s.size, dtype=bool), floor
 
 
 def _eigenvalues(system: DelaySystem, depth: float, line: float | None) -> _Gathered:
