@@ -15,6 +15,8 @@ EPSILON = float(np.finfo(float).eps)
 # An iteration that comes to rest with steps larger than this has found a multiple root, or
 # nothing: at a root Δ is singular to so much.
 _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
+# Relative steps about a root of high multiplicity, at most.
+_ABOUT = 0.05
 
 
 def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
@@ -66,9 +68,11 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
         done |= stalled | square | (size <= 4 * EPSILON * scale)
         if done.all():
             break
-    rough = np.flatnonzero(np.isfinite(s) & (~done | (last > _ROUGH_STEP * (1.0 + np.abs(s)))))
+    scale = 1.0 + np.abs(s)
+    # Members of a multiple root may still move about it: where Δ is singular they are it.
+    still = ~done & (last < _ABOUT * scale)
+    rough = np.flatnonzero(still | (done & (last > _ROUGH_STEP * scale)))
     if rough.size:
-        # Members of a multiple root may still move about it: where Δ is singular they are it.
         done[rough] = are_roots(system, s[rough])
     return s, done
 

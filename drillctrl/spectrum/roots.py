@@ -81,6 +81,9 @@ def _apart(system: DelaySystem, depth: float, line: float | None) -> _Gathered |
     floor = line
     if floor is None:
         floor = max(float(s.real.max()) - depth, *(lowest for *_, lowest in found))
+        if depth > 0.0 and not floor < s.real.max():
+            # Numbers so large that a depth is rounded away.
+            return None
     s = s[s.real >= floor]
     if not are_roots(system, s).all():
         return None
