@@ -20,6 +20,8 @@ _OF_THE_LOOP = (
     *("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades"),
     *("rig", "speed", "rop", "wob", "rock_strength", "structure", "k1", "k2"),
 )
+# A number and a unit: 1e12 is no 1 of a unit e12.
+_TYPED = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?![eE][-+]?\d+\s*$)([A-Za-z'\"].*?)\s*")
 # Numbers of a rig's point → the options that they are typed with.
 _OF_THE_RIG = {"rotary_speed": "--speed", "penetration_rate": "--rop", "weight_on_bit": "--wob"}
 
@@ -72,27 +74,14 @@ def _as_typed(ctx: click.Context, flags: Mapping[str, str]) -> Iterator[None]:
     except InputError as error:
         named = {flag: ctx.params.get(name) for name, flag in flags.items()}
         typed = named.get(error.parameter)
-        parts = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z'\"].*?)\s*", str(typed))
-        if not (
-            isinstance(typed, str)
-            and parts
-            and not _is_number(typed)
-            and isinstance(error.value, float | int)
-        ):
+        parts = _TYPED.fullmatch(typed) if isinstance(typed, str) else None
+        if parts is None or not isinstance(error.value, float | int):
             raise
-        permitted = in_units(error.permitted, float(parts[1]), float(error.value), parts[2])
+        permitted = _in_units(error.permitted, float(parts[1]), float(error.value), parts[2])
         raise InputError(error.parameter, typed, permitted) from None
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def in_units(permitted: str, number: float, value: float, unit: str) -> str:
+def _in_units(permitted: str, number: float, value: float, unit: str) -> str:
     """Return an interval of `interval_text` in the unit in which ``value`` is ``number``."""
     limits = re.search(r"([\[(])(\S+), (\S+)([\])])", permitted)
     if limits is None:
