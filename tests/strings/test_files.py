@@ -183,3 +183,16 @@ def test_a_file_of_ones_own_begins_as_a_preset(tmp_path, capsys):
         cli.main(["rig", "check", "table1", "--out", str(tmp_path / "rig.json")])
     assert stop.value.code == 2
     assert "--out = " in capsys.readouterr().err
+
+
+def test_all_that_is_missing_is_told_at_once(tmp_path):
+    (tmp_path / "rig.toml").write_text('sections = "tally.csv"\n[bit]\nblades = 4\n[rock]\n')
+    with pytest.raises(InputError) as told:
+        load_rig(tmp_path / "rig.toml")
+    for name in ("diameter", "wearflat_length", "geometry in [bit]", "strength, contact_strength"):
+        assert name in str(told.value)
+    (tmp_path / "tally.csv").write_text("name,length [m],OD [mm]\na,10,\nb,20,30\n")
+    with pytest.raises(InputError) as told:
+        read_tally(tmp_path / "tally.csv")
+    assert "type, outer_diameter, inner_diameter in row 2" in str(told.value)
+    assert "type, inner_diameter in row 3" in str(told.value)
