@@ -186,7 +186,9 @@ from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
 from .strings.drive_sampled import SampledDrive as SampledDrive
 from .strings.drive_sampled import sampled_drive as sampled_drive
-from .strings.drive_sampled import sampled_radius as sampled_radius
+from .strings.drive_sampled_loop import sampled_radius as sampled_radius
+from .strings.drive_sampled_loop import sampled_slope as sampled_slope
+from .strings.drive_sampled_loop import sampled_slopes as sampled_slopes
 from .strings.drive_stepped import SteppedDrive as SteppedDrive
 from .strings.drive_table import DriveTable as DriveTable
 from .strings.drive_table import drive_table as drive_table
