@@ -84,7 +84,6 @@ def _apart(system: DelaySystem, depth: float, line: float | None) -> _Gathered |
         if depth > 0.0 and not floor < s.real.max():
             # Numbers so large that a depth is rounded away.
             return None
-    s = s[s.real >= floor]
     if not are_roots(system, s).all():
         return None
     return s[np.argsort(-s.real, kind="stable")], np.ones(s.size, dtype=bool), floor
