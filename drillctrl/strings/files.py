@@ -379,17 +379,28 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
         )
         if name in value
     }  # fmt: skip
-    return Section(
-        str(row.get("name", row.get("pipe", kind))),
-        kind,
-        value["length"],
-        value["outer_diameter"],
-        value["inner_diameter"],
-        _tool_joint(value, where) or (bought.tool_joint if bought else None),
-        joints,
-        value.get("weight"),
-        replace(MATERIALS[material], **own),
-    )
+    name = str(row.get("name", row.get("pipe", kind)))
+    with blamed_on(where, _written(row, name)):
+        return Section(
+            name,
+            kind,
+            value["length"],
+            value["outer_diameter"],
+            value["inner_diameter"],
+            _tool_joint(value, where) or (bought.tool_joint if bought else None),
+            joints,
+            value.get("weight"),
+            replace(MATERIALS[material], **own),
+        )
+
+
+def _written(row: Mapping[str, Any], name: str) -> dict[str, tuple[str, object]]:
+    """Return what stands in a row for what a section checks; lengths follow from joints too."""
+    short = {"outer_diameter": "OD", "inner_diameter": "ID"}
+    names = {f"{short.get(key, key)} of {name}": key for key in ("length", "weight", *short)}
+    names |= {f"{short[key]} of tool joint": f"tool_joint_{key}" for key in short}
+    names |= {f"tool joint length{of}": "tool_joint_length" for of in ("", f" of {name}")}
+    return {said: (key, row[key]) for said, key in names.items() if key in row}
 
 
 def _tool_joint(value: Mapping[str, Any], where: str) -> ToolJoint | None:
