@@ -18,6 +18,7 @@ from drillctrl.base.text import finite_or_none
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.changed import changed_rig
 from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drives import drive_control, machine_of
 from drillctrl.strings.drives_words import law_text
@@ -63,6 +64,12 @@ class DriveTable:
     def stable(self) -> bool:
         """Whether string and drive are, with a free bit, at and between all depths."""
         return all(drive.stable for drive in self.drives) and min(self.between, default=1.0) > 0.0
+
+    @property
+    def laws(self) -> DriveLaws:
+        """The laws alone, as a map takes them."""
+        controls = tuple(drive.control for drive in self.drives)
+        return DriveLaws(self.structure, self.depths, controls)
 
     def _rows(self) -> list[dict[str, Any]]:
         rows = []
