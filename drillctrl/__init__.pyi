@@ -175,6 +175,8 @@ from .strings.drive_control import DriveMachine as DriveMachine
 from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
 from .strings.drive_law import driven_plant as driven_plant
+from .strings.drive_laws import DriveLaws as DriveLaws
+from .strings.drive_laws import load_laws as load_laws
 from .strings.drive_measures import DriveMeasures as DriveMeasures
 from .strings.drive_observer import observer_drive_control as observer_drive_control
 from .strings.drive_rules import fastest_control as fastest_control

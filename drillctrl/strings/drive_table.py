@@ -17,6 +17,7 @@ from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none, wrapped
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.changed import changed_rig
+from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
 from drillctrl.strings.drives import drive_control, machine_of
@@ -66,6 +67,12 @@ class DriveTable:
     def stable(self) -> bool:
         """Whether string and drive are, with a free bit, at and between all depths."""
         return all(drive.stable for drive in self.drives) and min(self.between, default=1.0) > 0.0
+
+    @property
+    def laws(self) -> DriveLaws:
+        """The laws alone, as a map takes them."""
+        controls = tuple(drive.control for drive in self.drives)
+        return DriveLaws(self.structure, self.depths, controls)
 
     def _rows(self) -> list[dict[str, Any]]:
         rows = []
