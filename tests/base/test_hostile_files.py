@@ -91,7 +91,7 @@ def test_all_verbs_are_there():
 # What an encoding lacks does not depend on the verb: each is run in one of them.
 @pytest.mark.parametrize(
     ("verb", "encoding"),
-    zip(VERBS, itertools.cycle(["cp1252", "cp437", "latin-1"]), strict=False),
+    [*zip(VERBS, itertools.cycle(["cp1252", "cp437", "latin-1"]), strict=False)],
 )
 def test_no_verb_loses_anything_in_an_old_encoding(verb, encoding, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
