@@ -83,6 +83,7 @@ def drive_controller(
             raise InputError(f"{name} of the drive", getattr(drive, name), wanted)
     if machine.encoder:
         raise InputError("encoder of the drive", machine.encoder, "0 in the simulator")
+    _check_counts(machine)
     proportional, integral = _gains(control)
     unit, time = rig.torsional_stiffness, rig.time_scale
     limit = _spare_torque(as_case(where), machine, unit)
@@ -147,6 +148,7 @@ def law_controller(
     if control.speed.excess > 0 and not machine.encoder:
         wanted = "a law without compensated inertia, or a drive with an encoder's filter"
         raise InputError("control", control.name, wanted)
+    _check_counts(machine)
     case = as_case(where, asking_plant(rig, control, bit))
     time = rig.time_scale
     return case, Controller(
@@ -175,8 +177,8 @@ def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[
     Returns
     -------
     Case, dict
-        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay and actuator_lag of
-        its machine as `Controller` takes them.
+        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay, actuator_lag and
+        encoder of its machine as `SteppedRun` takes them.
 
     Raises
     ------
@@ -195,6 +197,8 @@ def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[
         "measurement_delay": machine.delay / rig.time_scale,
         "actuator_lag": machine.lag / rig.time_scale,
     }
+    if machine.encoder_counts is not None:
+        around["encoder"] = math.tau / machine.encoder_counts
     return case, around if limit is None else {**around, "limit": limit}
 
 
@@ -270,6 +274,13 @@ def simulate_drive(
         run.hold([command / torque])
         run.advance()
     return run.result()
+
+
+def _check_counts(machine: DriveMachine) -> None:
+    """Refuse an encoder that counts where a law feeds back its states."""
+    if machine.encoder_counts is not None:
+        wanted = "left out here: simulate_drive and bench count, sample by sample"
+        raise InputError("encoder_counts of the drive", machine.encoder_counts, wanted)
 
 
 def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:
