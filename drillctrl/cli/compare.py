@@ -11,7 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
 from drillctrl.cli.drives import are_drives, deliver_drives, drive_options, refuse_drive_options
 from drillctrl.cli.gains import read_bounds, read_gains, scales_at
-from drillctrl.cli.output import check_folder, json_text, writing
+from drillctrl.cli.output import check_folder, json_text, plain, writing
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.roots import trials_option, wants_trials
@@ -115,7 +115,7 @@ def compare_command(
         )
     if out is not None:
         _write(result, out)
-    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+    click.echo(json_text(result.to_dict()) if as_json else plain(result.summary()))
 
 
 def read_given(text: str, where: OperatingPoint | RigPoint) -> Given:

@@ -11,7 +11,14 @@ import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_figure,
+    deliver,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.point import read_point, rig_name
 
 if TYPE_CHECKING:
@@ -24,7 +31,7 @@ ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
 _BEARS = (*_POINT, "trials", "units", "structures", "as_json", "out", *_ALONE)
-_TABLE_BEARS = ("rig", "depth", "structure", "require_stable", "as_json", "out", "plot")
+_TABLE_BEARS = ("rig", "units", "depth", "structure", "require_stable", "as_json", "out", "plot")
 _RUNS = ("trials", "workers")
 _DESIGN_BEARS = (*_POINT, *_RUNS, "units", "structure", "require_stable", "as_json", "out", "plot")
 
@@ -135,7 +142,12 @@ def _refuse_others(structure: str, bears: Sequence[str]) -> None:
 
 
 def deliver_drive_table(
-    structure: str, options: Mapping[str, Any], as_json: bool, out: str | None, plot: str | None
+    structure: str,
+    options: Mapping[str, Any],
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    units: str | None = None,
 ) -> bool:
     """Find the law of a top drive at each depth, print, and write the files asked for.
 
@@ -176,8 +188,8 @@ def deliver_drive_table(
     else:
         _write(found, out)
     if plot is not None:
-        write_figure(plot, found.plot())
-    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+        write_figure(plot, found.plot(units))
+    click.echo(json_text(found.to_dict()) if as_json else plain(found.summary(units)))
     return found.stable and found.harm is None
 
 
@@ -253,4 +265,4 @@ def deliver_drives(
     _write(found, out)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot(rig_name(point)))
-    click.echo(json_text(fields) if as_json else text)
+    click.echo(json_text(fields) if as_json else plain(text))

@@ -12,6 +12,7 @@ from drillctrl.cli.output import (
     check_figure,
     check_folder,
     json_text,
+    plain,
     write_figure,
     write_json,
     writing,
@@ -93,7 +94,7 @@ def record_command(
         _write(study, out)
     if plot is not None:
         write_figure(plot, study.plot())
-    click.echo(json_text(study.to_dict()) if as_json else study.summary())
+    click.echo(json_text(study.to_dict()) if as_json else plain(study.summary()))
 
 
 def _study(
