@@ -113,6 +113,7 @@ from .motion.torsion import TorsionalMode as TorsionalMode
 from .motion.torsion import torsional_modes as torsional_modes
 from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
+from .records.computed import with_computed_map as with_computed_map
 from .records.downhole import Downhole as Downhole
 from .records.downhole import bit_from_surface as bit_from_surface
 from .records.example import example_path as example_path

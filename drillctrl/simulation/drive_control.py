@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -219,7 +220,7 @@ def simulate_drive(
     law: SampledDrive,
     *,
     duration: float = 200.0,
-    depth: float | None = None,
+    depth: float | Sequence[float] | None = None,
     **options: Any,
 ) -> Simulation:
     """Simulate the string under a sampled law of its drive, as the exported source computes it.
@@ -233,8 +234,9 @@ def simulate_drive(
         torque comes to that of steady drilling, which leaves so much less of the limit.
     duration : float
         Dimensionless time to simulate.
-    depth : float, optional
-        That the law is told, m; by default the length of the string.
+    depth : float or sequence of float, optional
+        What the law is told on its axes, SI; by default of where it drills: the length of the
+        string, the rotary speed, the strength of the rock, the density of the mud.
     **options
         Of `SteppedRun`: scenario, initial, cutting, backwards, rtol, atol, and of the drive
         measurement_delay and actuator_lag where they are not those of the rig's.
@@ -259,7 +261,13 @@ def simulate_drive(
         case, ("dphi",), ("drive",), period=law.period / time, duration=duration,
         **{**around, **options},
     )  # fmt: skip
-    place = rig.string.length if depth is None else depth
+    here = {
+        "depth": rig.string.length,
+        "rotary_speed": where.rotary_speed,
+        "rock_strength": rig.rock_strength,
+        "mud": rig.string.mud_density,
+    }
+    place = [here[name] for name, _ in law.axes] if depth is None else depth
     late, lag = (float({**around, **options}[name]) * time for name in DRIVE_PATH)
     kept = math.exp(-law.period / lag) if lag else 0.0
     # What the drive gave when the speed was measured that is there now.
