@@ -175,6 +175,8 @@ from .strings.drive_control import DriveMachine as DriveMachine
 from .strings.drive_control import Transfer as Transfer
 from .strings.drive_design import dynamic_drive_control as dynamic_drive_control
 from .strings.drive_law import driven_plant as driven_plant
+from .strings.drive_laws import DriveLaws as DriveLaws
+from .strings.drive_laws import load_laws as load_laws
 from .strings.drive_measures import DriveMeasures as DriveMeasures
 from .strings.drive_observer import observer_drive_control as observer_drive_control
 from .strings.drive_rules import fastest_control as fastest_control
@@ -186,7 +188,9 @@ from .strings.drive_rules import transfer_control as transfer_control
 from .strings.drive_rules import z_torque_control as z_torque_control
 from .strings.drive_sampled import SampledDrive as SampledDrive
 from .strings.drive_sampled import sampled_drive as sampled_drive
-from .strings.drive_sampled import sampled_radius as sampled_radius
+from .strings.drive_sampled_loop import sampled_radius as sampled_radius
+from .strings.drive_sampled_loop import sampled_slope as sampled_slope
+from .strings.drive_sampled_loop import sampled_slopes as sampled_slopes
 from .strings.drive_stepped import SteppedDrive as SteppedDrive
 from .strings.drive_table import DriveTable as DriveTable
 from .strings.drive_table import drive_table as drive_table

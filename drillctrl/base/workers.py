@@ -102,6 +102,11 @@ def _processes(workers: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+
+
 def follow_parent() -> None:
     """Let a process end when the one that started it has ended, however it did."""
     parent = multiprocessing.parent_process()

@@ -256,6 +256,12 @@ class Plane:
             part[:, np.array(rows)[:, None], columns] = gains
         return whole
 
+    def rig_point_at(self, x: float, y: float) -> RigPoint | None:
+        """Return the rig's point at one place; None without a rig, or over a group."""
+        values = {self.x.name: np.array([x]), self.y.name: np.array([y])}
+        given, own = self._split(values)
+        return None if self.rig_point is None or own else self._rig_points(given, 1)[0]
+
     def case_at(self, x: float, y: float) -> Case:
         """Return the case at one place."""
         values = {self.x.name: np.array([x]), self.y.name: np.array([y])}

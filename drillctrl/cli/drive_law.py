@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.simulation.controller import Controller
     from drillctrl.strings.drive_control import DriveControl
-    from drillctrl.strings.rig import StringRig
 
 # Options of a controller that a law of a drive does not take, as they are when left out.
 _NOT_DRIVEN = {
@@ -56,18 +55,28 @@ def driven_case(
         If there is no rig with a top drive, or an option does not fit.
     """
     from drillctrl.drilling.case import as_case
+    from drillctrl.drilling.point import RigPoint
     from drillctrl.strings.drive_law import driven_plant
+    from drillctrl.strings.rig import StringRig
 
     if tried:
         raise InputError("--trials", "all", "none for structures of a top drive")
-    rig, control = _law_at(where, structure, gains)
-    return as_case(where, driven_plant(rig, control, bit))
+    control = drive_law(where, structure, gains)
+    assert isinstance(where, RigPoint)
+    assert isinstance(where.rig, StringRig)
+    return as_case(where, driven_plant(where.rig, control, bit))
 
 
-def _law_at(
+def drive_law(
     where: OperatingPoint | RigPoint, structure: str, gains: tuple[str | None, str | None]
-) -> tuple[StringRig, DriveControl]:
-    """Return the rig of a point, and the law of its top drive."""
+) -> DriveControl:
+    """Return a law of the top drive of a rig: that of its rule, or with the gains typed.
+
+    Raises
+    ------
+    InputError
+        If there is no rig with a top drive, or an option does not fit.
+    """
     from drillctrl.drilling.plant import top_drive_plant
     from drillctrl.drilling.point import RigPoint
     from drillctrl.drilling.structures import soft_torque
@@ -82,14 +91,14 @@ def _law_at(
     machine_of(where.rig)
     assert isinstance(where.rig, StringRig)
     if k1 is None:
-        return where.rig, drive_control(structure, where.rig)
+        return drive_control(structure, where.rig)
     scales = gain_scales(soft_torque(), top_drive_plant(1.0), where.rig)
     with naming("--K1", "K1"):
         read = read_gains("K1", k1, scales)
         assert read is not None
         assert scales is not None
         si = [gain * scale for gain, (scale, _) in zip(read, scales, strict=False)]
-        return where.rig, given_control(structure, where.rig, si[0], si[1])
+        return given_control(structure, where.rig, si[0], si[1])
 
 
 def driven_run(
@@ -109,11 +118,30 @@ def driven_run(
     InputError
         If there is no rig with a top drive, or an option does not fit.
     """
-    from drillctrl.base import units
-    from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation.drive_control import law_controller
 
     structure = options["structure"]
+    where, around = driven_place(where, options, structure)
+    control = drive_law(where, structure, (options["k1"], options["k2"]))
+    return law_controller(where, control, **around)
+
+
+def driven_place(
+    where: OperatingPoint | RigPoint, options: Mapping[str, Any], structure: str
+) -> tuple[RigPoint, dict[str, Any]]:
+    """Return where a rig drills whose drive is as was typed, and the clock of its law.
+
+    Raises
+    ------
+    InputError
+        If there is no rig with a top drive, or an option does not fit.
+    """
+    from drillctrl.base import units
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.strings.drives import machine_of
+
+    if not isinstance(where, RigPoint):
+        raise InputError("--structure", structure, "used with --rig: it turns a string")
     for name, usual in _NOT_DRIVEN.items():
         if options[name] != usual:
             wanted = f"left out with --structure {structure}, a law of a top drive"
@@ -127,13 +155,9 @@ def driven_run(
         )
         if options[name] is not None
     }
-    if changed and isinstance(where, RigPoint):
-        from drillctrl.strings.drives import machine_of
-
+    if changed:
         machine = replace(machine_of(where.rig), **changed)
         where = replace(where, rig=replace(where.rig, drive=machine))  # type: ignore[call-arg]
-    _, control = _law_at(where, structure, (options["k1"], options["k2"]))
-    assert isinstance(where, RigPoint)
     period = options["period"]
     seconds = None if period is None else units.to_si("--period", period, units.TIME)
-    return law_controller(where, control, period=seconds)
+    return where, {} if seconds is None else {"period": seconds}

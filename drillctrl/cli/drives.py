@@ -91,7 +91,7 @@ def deliver_drive_design(
     Returns
     -------
     bool
-        Whether it is stable: with a free bit, and at the point if there is one.
+        Whether it is stable and recommended.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def deliver_drive_design(
     text = functools.partial(found.summary, units)
     draw = functools.partial(found.plot, rig_name(point))
     deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
-    return found.stable
+    return found.stable and found.drive.verdict.recommended
 
 
 def _refuse_others(structure: str, bears: Sequence[str]) -> None:
@@ -135,7 +135,7 @@ def deliver_drive_table(
     Returns
     -------
     bool
-        Whether all of it is stable with a free bit.
+        Whether all of it is stable with a free bit and recommended.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def deliver_drive_table(
     if plot is not None:
         write_figure(plot, found.plot())
     click.echo(json_text(found.to_dict()) if as_json else found.summary())
-    return found.stable
+    return found.stable and found.harm is None
 
 
 def _write(found: DriveComparison | DriveTable, out: str | None) -> None:

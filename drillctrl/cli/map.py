@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.cli.axes import read_counted_axis, with_axes
+from drillctrl.cli.drive_law import drive_law, driven_place
+from drillctrl.cli.drives import are_drives
 from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
 from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.progress import open_progress
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from drillctrl.base.checkpoint import Checkpoint
     from drillctrl.drilling.point import OperatingPoint, RigPoint
     from drillctrl.simulation.controller import Controller
+    from drillctrl.strings.drive_laws import DriveLaws
     from drillctrl.tables.gain_table import GainTable
 
 _RIG_AXES = ("speed=50:180 rpm", "rop=5:50 m/h")
@@ -58,6 +61,16 @@ _COUNTS = (15, 12)
 )
 @controller_options
 @click.option(
+    "--against",
+    metavar="WHAT",
+    help="In place of no control: a law of the drive, 'pd; K1=-3 kN*m/rad,…', or a table's file.",
+)
+@click.option(
+    "--threshold",
+    is_flag=True,
+    help="Also where torsion loses its damping on the motion drilled with: some minutes more.",
+)
+@click.option(
     "--starts",
     default="small,kick,back",
     show_default=True,
@@ -88,6 +101,8 @@ def map_command(
     x_axis: str | None,
     y_axis: str | None,
     refine: int,
+    against: str | None,
+    threshold: bool,
     starts: str,
     duration: str | None,
     workers: int | None,
@@ -101,26 +116,33 @@ def map_command(
 ) -> None:
     """Map stick-slip and bit bounce over what a driller sets, by nonlinear runs.
 
-    Where gains are given the map without control stands beside that with them. The line is the
-    edge of stable drilling by linear theory.
+    Where gains or a law of the top drive are given, the map without control stands beside that
+    with them, or that of --against. The line is the edge of stable drilling by linear theory.
+    A rig with a top drive is held by a stiff one where nothing else is said.
 
     \b
     Axes: omega0, delta0, psi, eta, xi, kappa, damping;
-    with --rig speed (rpm), rop (m/h), wob (kN), rock_strength (MPa).
+    with --rig speed (rpm), rop (m/h), wob (kN), rock_strength (MPa), and of
+    a string depth (m) and mud (kg/m^3).
 
     \b
     Examples:
       drillctrl map --rig table1 --speed "120 rpm" --rop "20 m/h" --refine 0 --plot map.png
       drillctrl map --rig table1 --x "speed=60:160:6 rpm" --y "wob=10:40:5 kN" --refine 0 \\
           --structure pd --K1 "-2 kN*m/rad,-400 N*m*s/rad" --limit "5 kN*m" --out map.csv
+      drillctrl map --rig vertical-3000 --x "speed=60:120:2 rpm" --y "rop=5:15:2 m/h" \\
+          --refine 0 --starts small --duration "1 s" --structure soft-torque
       drillctrl map --x omega0=4:20:6 --y delta0=0.5:6:5 --psi 14 --refine 0
 
     With --out a run that was killed goes on where it was when it is started again.
     """
     check_folder("--out", out)
     check_figure(plot)
-    if difference and all(options[name] is None for name in ("structure", "table")):
-        raise InputError("--difference", "given", "left out where there is no control")
+    if all(options[name] is None for name in ("structure", "table")):
+        if difference:
+            raise InputError("--difference", "given", "left out where there is no control")
+        if against is not None:
+            raise InputError("--against", against, "given together with --structure or --table")
     shown = tuple(part.strip() for part in show.split(","))
     if workers is not None:
         checked_integer("workers", workers, 1, 1024)
@@ -133,13 +155,15 @@ def map_command(
     given = with_axes(options, x, y)
     where = read_point({name: given[name] for name in options})
     from drillctrl.base.checkpoint import Checkpoint
-    from drillctrl.base.workers import open_executor
+    from drillctrl.base.workers import cores, open_executor
     from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.starts import possible_starts
     from drillctrl.simulation.structure import structure_of
+    from drillctrl.studies.tasks import closed_at
     from drillctrl.studies.vibration import vibration_map
+    from drillctrl.studies.vibration_edge import held_against
     from drillctrl.studies.vibration_figure import check_shown
     from drillctrl.studies.vibration_files import check_map_path
 
@@ -149,13 +173,16 @@ def map_command(
     with naming("--show", "quantities"):
         check_shown(shown)
     rig = where.rig if isinstance(where, RigPoint) else None
-    controller, surroundings = _read_controller(options, where)
-    names = read_starts(starts, possible_starts(where))
+    where, controller, surroundings = _read_controller(options, where)
+    other = None if against is None else _read_against(against, options, where)
+    case, rig_point = as_case(where), where if isinstance(where, RigPoint) else None
+    held = closed_at(controller or held_against(None, case), case, rig_point, surroundings)[0]
+    names = read_starts(starts, possible_starts(held))
     length = read_duration(duration, rig)
     if not is_compiled(structure_of(as_case(where)).physics):
         click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     with (
-        open_executor(workers or _cores(), scheduler) as executor,
+        open_executor(workers or cores(), scheduler) as executor,
         nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,
         open_progress() as progress,
         naming("--x or --y", "counts"),
@@ -165,10 +192,12 @@ def map_command(
             x,
             y,
             controller,
+            other,
             counts=(across, up),
             refine=refine,
             starts=names,
             duration=length,
+            threshold=threshold,
             mark=_is_typed(options, x[0], y[0]),
             surroundings=surroundings,
             executor=executor,
@@ -176,7 +205,7 @@ def map_command(
             progress=progress,
         )
     if beyond := result.unvouched():
-        told = f"the table does not vouch for {beyond} of {len(result.nodes)} points"
+        told = f"the table holds no safe gains for {beyond} of {len(result.nodes)} points"
         click.echo(f"drillctrl: note: {told}", err=True)
     if out is not None:
         path = out
@@ -186,10 +215,6 @@ def map_command(
     if plot is not None:
         write_figure(plot, result.plot(shown, rig_name(options), difference))
     click.echo(json_text(result.to_dict()) if as_json else result.summary())
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
 
 
 def _check_weight(options: dict[str, Any], *axes: str) -> None:
@@ -204,17 +229,52 @@ def _is_typed(options: dict[str, Any], *axes: str) -> bool:
     return all(options.get(name) is not None for name in axes if name != "rock_strength")
 
 
+def _read_against(
+    text: str, options: dict[str, Any], where: OperatingPoint | RigPoint
+) -> Controller | GainTable | DriveLaws:
+    """Return what the controller is held against: a table's file, or a structure and its gains."""
+    asked: dict[str, Any] = {**options, "structure": None, "k1": None, "k2": None, "table": None}
+    if Path(text).suffix:
+        asked["table"] = text
+    else:
+        asked["structure"], *gains = (part.strip() for part in text.split(";"))
+        for part in gains:
+            name, equals, value = part.partition("=")
+            if name.strip() not in ("K1", "K2") or not equals:
+                wanted = "a structure, with gains as in 'pd; K1=-3 kN*m/rad,-50 N*m*s/rad'"
+                raise InputError("--against", text, wanted)
+            asked[name.strip().lower()] = value.strip()
+    found = _read_controller(asked, where)[1]
+    assert found is not None
+    return found
+
+
 def _read_controller(
     options: dict[str, Any], where: OperatingPoint | RigPoint
-) -> tuple[Controller | GainTable | None, dict[str, Any] | None]:
-    """Return what closes the loop, and what surrounds the gains of a table."""
+) -> tuple[
+    OperatingPoint | RigPoint, Controller | GainTable | DriveLaws | None, dict[str, Any] | None
+]:
+    """Return where it drills, what closes the loop, and what surrounds that.
+
+    The drive of a rig under a law of its own has the delay, lag and limit that were typed.
+    """
     from drillctrl.drilling.point import RigPoint
     from drillctrl.simulation.scenario import Scenario
+    from drillctrl.strings.drive_laws import is_laws_file, load_laws, one_law
+    from drillctrl.strings.drives import machine_of
 
     rig = where.rig if isinstance(where, RigPoint) else None
     groups = where.operating_point() if isinstance(where, RigPoint) else where
-    if options["table"] is None:
-        return read_controller(options, where, groups, Scenario(), 1.0, rig), None
+    structure, table = options["structure"], options["table"]
+    laws = table is not None and structure is None and is_laws_file(table)
+    if laws or (table is None and structure is not None and are_drives([structure])):
+        where, around = driven_place(where, {**options, "table": None}, structure or table)
+        if laws:
+            return where, load_laws(table, machine_of(where.rig)), around
+        control = drive_law(where, structure, (options["k1"], options["k2"]))
+        return where, one_law(control), around
+    if table is None:
+        return where, read_controller(options, where, groups, Scenario(), 1.0, rig), None
     for name in ("structure", "k1", "k2"):
         if options[name] is not None:
             option = {"k1": "--K1", "k2": "--K2"}.get(name, "--structure")
@@ -226,8 +286,8 @@ def _read_controller(
     from drillctrl.tables.files import load_table
 
     surroundings = {name: options[name] for name in SURROUNDINGS}
-    table = load_table(options["table"], as_case(where).plant)
-    return table, read_surroundings(surroundings, rig)
+    loaded = load_table(table, as_case(where).plant)
+    return where, loaded, read_surroundings(surroundings, rig)
 
 
 def _finish(checkpoint: Checkpoint) -> None:

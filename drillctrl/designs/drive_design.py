@@ -16,7 +16,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
-from drillctrl.strings.drives_words import law_text, setting_sentence
+from drillctrl.strings.drives_words import law_text, refusal, setting_sentence
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.strings.rig import StringRig
@@ -86,8 +86,11 @@ class DriveDesign:
 
     def summary(self, units: str = "si") -> str:
         """Return a text for people, in the units of ``"si"`` or ``"field"``."""
+        language = told_language(units)
+        good = self.drive.verdict.recommended
+        first = setting_sentence(self.drive.control, language)
         lines = [
-            wrapped(setting_sentence(self.drive.control, told_language(units))),
+            wrapped(first if good else refusal(self.drive, language)),
             wrapped(f"Law in SI units: {law_text(self.drive.control)}"),
             "",
             self.found.summary(units),

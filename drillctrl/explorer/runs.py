@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
 
 import numpy as np
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.base.workers import open_executor
+from drillctrl.base.workers import cores, open_executor
 from drillctrl.designs.design import design
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.explorer.commands import command_line, python_text
@@ -108,23 +107,20 @@ def _columns(asked: Asked, run: Simulation, times: Any) -> list[dict[str, Any]]:
 
 def vibrations(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     """Return how hard the bit vibrates over the chart's axes; `vibration_map`."""
-    if asked.law is not None:
-        wanted = "gains at the bit, or none: a map tries no law of a top drive"
-        raise InputError("controller", asked.given["structure"], wanted)
     x, y = read_axes(asked, options)
     counts = options.get("counts")
     if not isinstance(counts, list) or len(counts) != 2:
         raise InputError("counts", "something else", "two numbers of points")
     across, up = (checked_integer("points", count, 2, _MOST_NODES) for count in counts)
-    case, controller = asked.run()
-    tell(0, across * up * (1 if controller is None else 2), "simulating")
+    closing: Any = asked.law or asked.run()[1]
+    tell(0, across * up * (1 if closing is None else 2), "simulating")
     # Processes of their own would take longer to start than a few points.
-    with open_executor(_cores() if across * up > _FEW_NODES else 1, None) as executor:
+    with open_executor(cores() if across * up > _FEW_NODES else 1, None) as executor:
         found = vibration_map(
-            case,
+            asked.where,
             x,
             y,
-            controller,
+            closing,
             counts=(across, up),
             refine=0,
             executor=executor,
@@ -142,17 +138,16 @@ def vibrations(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
         "command": command_line(asked, "map", *words),
         "python": python_text(
             asked,
-            ["Controller", "vibration_map"],
-            "controller = Controller(*gains) if gains else None",
+            ["vibration_map", *([] if asked.law else ["Controller"])],
+            "controller = law"
+            if asked.law
+            else "controller = Controller(*gains) if gains else None",
             f"result = vibration_map(point, {x!r}, {y!r}, controller, counts={(across, up)!r},"
             " refine=0)",
             "print(result.summary())",
+            closed=False,
         ),
     }
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
 
 
 def gains(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:

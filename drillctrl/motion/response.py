@@ -27,8 +27,9 @@ MOST_PERIODS, FEWEST_PERIODS = 400, 40
 # drilling, and off the rock.
 KICKS = (0.1, -2.0)
 # Periods of a half window. Half windows of a run that is gone on from, an even number; fewer
-# of a long string, whose history takes much memory.
+# of a long string, whose history takes much memory, and in longer steps.
 _PERIODS, _PER_RUN, _PER_LONG_RUN, _LONG = 4, 10, 2, 20
+_LONG_RTOL = 1e-6
 _SETTLING = 10.0
 _SHORTEST, _LONGEST = 60.0, 500.0
 _SURE = 2.0
@@ -202,9 +203,11 @@ class _Start:
     ) -> None:
         plant, point = case.physics("the response of a bit")
         self.case, self.frequency = case, frequency
-        self.options = {"backwards": "stop", **options}
         self.speed = amplitude * point.omega0
-        self.per_run = _PER_RUN if len(plant.state_names) <= _LONG else _PER_LONG_RUN
+        long = len(plant.state_names) > _LONG
+        self.per_run = _PER_LONG_RUN if long else _PER_RUN
+        # Of a long string the windows differ by more than that, and runs cost more.
+        self.options = {"backwards": "stop"} | ({"rtol": _LONG_RTOL} if long else {}) | options
         period = 2.0 * math.pi / frequency
         self.half = _PERIODS * period
         self.wait = period * math.ceil(settling / period)
@@ -235,7 +238,7 @@ class _Start:
         elif grows_without_bound(run, run.at(run.times, ("x", "dx", "dtheta"))):
             self.broken = Outcome.DIVERGES
         else:
-            self.scenario = Scenario(start=run.past())
+            self.scenario = Scenario(start=run.past(kept=0.0))
             speed = run.at(run.times, ("dtheta",)).dtheta
             self.swing = float(np.ptp(speed)) / 2.0
         return run

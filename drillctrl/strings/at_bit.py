@@ -93,6 +93,12 @@ def fed_by_weight(plant: Plant) -> bool:
     return any(isinstance(block, Hoist) for block in plant.blocks)
 
 
+def turns_freely(plant: Plant) -> bool:
+    """Whether nothing holds the speed of a plant's top drive."""
+    laws = any(isinstance(block, DriveLaw) for block in plant.blocks)
+    return not laws and any(isinstance(block, TopDrive) for block in plant.blocks)
+
+
 def string_at_bit(plant: Plant) -> StringAtBit | None:
     """Return the exact string of a plant; None if the plant is none of pipe under imposed feed.
 

@@ -12,7 +12,7 @@ from drillctrl.drilling.case import Case, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.strings.at_bit import string_at_bit
+from drillctrl.strings.at_bit import string_at_bit, turns_freely
 from drillctrl.strings.drill_string import DEEPEST, HEAVIEST_MUD, DrillString
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.model import PipeString
@@ -119,6 +119,8 @@ def restrung(plant: Plant, depth: float | None = None, mud: float | None = None)
 def changed_plant(plant: Plant, rig: Rig) -> Plant:
     """Return the plant of a rig that was changed, with the laws of bit and drive of a plant."""
     assert isinstance(rig, StringRig)
+    if isinstance(plant.string, PipeString) and turns_freely(plant):
+        return paper_plant(plant.bit, **rig.hardware())
     known = string_at_bit(plant)
     if known is None:
         raise InputError("plant", "with parts of your own", "that of a rig's string")

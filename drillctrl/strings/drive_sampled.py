@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypedDict, Unpack
 
 import numpy as np
-import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
@@ -298,48 +297,3 @@ def _node(parts: tuple[float, _Part, _Part], order: int, step: float) -> DriveNo
     C = c @ half
     E, D = np.asarray(-np.linalg.solve(a, b), float), d + 0.5 * step * C @ b
     return DriveNode(F, G, E, C, D, integral)
-
-
-@checks_kinds
-def sampled_radius(law: SampledDrive, pipe: float) -> float:
-    """Return the spectral radius of a sampled drive on endless pipe; above 1 its loop grows.
-
-    That is the fast part of the loop, which the period decides on: drive, lag, delay (in whole
-    periods), held torque and law. Waves that return are much slower.
-
-    Parameters
-    ----------
-    law : SampledDrive
-        The largest radius of all its depths is taken.
-    pipe : float
-        ζ of the uppermost pipe, N m s/rad.
-    """
-    machine, step = law.machine, law.period
-    fast = 1e-3 * step
-    a = np.array([[-pipe, 1.0], [0.0, 0.0]]) / machine.inertia
-    a[1, 1] = -1.0 / max(machine.lag, fast)
-    moved = scipy.linalg.expm(step * np.block([[a, np.array([[0.0], [-a[1, 1]]])], [np.zeros(3)]]))
-    late = math.ceil(machine.delay / step - 1e-9)
-    return max(_radius(law, node, moved, late) for node in law.nodes)
-
-
-def _radius(law: SampledDrive, node: DriveNode, moved: FloatArray, late: int) -> float:
-    """Return the spectral radius of one law's loop, by its matrix."""
-    stiff, kept, new, held = law.filters
-    n, step = law.order, law.period
-    # Speed, torque that acts, filtered speed and torque, speed before, integral, law, commands.
-    size = 6 + n + late + 1
-    speed, given, slow, drag, before, integral = np.eye(size)[:6]
-    states = np.eye(size)[6 : 6 + n]
-    slow = kept * slow + new * (speed + before)
-    drag = held * drag + (1.0 - held) * given
-    seen = np.stack([speed, stiff * (speed - slow) - drag])
-    integral = integral - node.K * 0.5 * step * (speed + before)
-    torque = node.C @ states + node.D @ seen + integral
-    acting = torque if late == 0 else np.eye(size)[6 + n + late - 1]
-    plant = np.vstack([np.eye(size)[:2], acting])
-    after = np.vstack(
-        [(moved @ plant)[:2], slow, drag, speed, integral, node.F @ states + node.G @ seen, torque,
-         np.eye(size)[6 + n : 6 + n + late]]
-    )  # fmt: skip
-    return float(abs(np.linalg.eigvals(after)).max())

@@ -71,6 +71,7 @@ class DriveComparison:
             {
                 "structure": drive.control.name,
                 "stable": drive.stable,
+                "recommended": drive.verdict.recommended,
                 "delay_margin": drive.delay_margin,
                 **mode.to_dict(),
             }

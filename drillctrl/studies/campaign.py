@@ -21,7 +21,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.workers import Progress
 from drillctrl.simulation.controller import Controller
-from drillctrl.studies.tasks import controller_at, run_tasks
+from drillctrl.studies.tasks import closed_at, run_tasks
 from drillctrl.studies.trial import Trial, try_point
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.grid import Grid
@@ -261,7 +261,7 @@ def campaign(
             raise InputError("largest", largest, f"such that θ' ≥ −ω0 = {-point.omega0:g}")
     trials = [
         Trial(
-            index, case, controller_at(controller, case), kick, steps, float(largest),
+            index, case, closed_at(controller, case)[1], kick, steps, float(largest),
             float(sharpness), duration, cutting, rtol,
         )
         for index, case in enumerate(grid.cases)

@@ -9,13 +9,21 @@ from dataclasses import fields
 from typing import Any, Protocol, TypeVar
 
 from drillctrl.base.checkpoint import Checkpoint
+from drillctrl.base.errors import InputError
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case
+from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.drive_control import law_controller
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.strings.changed import string_of
+from drillctrl.strings.drive_laws import DriveLaws
+from drillctrl.strings.drives import machine_of
 from drillctrl.tables.gain_table import GainTable
+
+Closing = Controller | GainTable | DriveLaws | None
 
 
 class PointTask(Protocol):
@@ -85,27 +93,43 @@ def task_key(case: Case, controller: Controller | None, *settings: Any) -> str:
     return hashlib.sha256(repr(parts).encode("utf-8")).hexdigest()
 
 
-def controller_at(
-    controller: Controller | GainTable | None,
+def closed_at(
+    controller: Closing,
     case: Case,
+    where: RigPoint | None = None,
     surroundings: Mapping[str, Any] | None = None,
-) -> Controller | None:
-    """Return what closes the loop at an operating point.
+) -> tuple[Case, Controller | None]:
+    """Return plant and controller of a loop at an operating point.
 
     Parameters
     ----------
-    controller : Controller, GainTable or None
-        One everywhere, or a table's gains.
+    controller : Controller, GainTable, DriveLaws or None
+        One everywhere, a table's gains, or the law of a top drive at the string's length.
     case : Case
         What drills, and where.
+    where : RigPoint, optional
+        The rig behind it, which a law of its drive needs.
     surroundings : mapping, optional
-        Further arguments of the `Controller` that is made of a table's gains.
+        Further arguments of the `Controller` that is made of a table's gains, or of
+        `law_controller`.
+
+    Raises
+    ------
+    InputError
+        If a law has no rig with a top drive to turn.
     """
+    if isinstance(controller, DriveLaws):
+        plant, _ = case.physics("a law of a top drive")
+        if where is None:
+            raise InputError("structure", controller.name, "used with a rig: it turns a string")
+        machine_of(where.rig)
+        law = controller.at(string_of(where.rig).length)
+        return law_controller(where, law, plant.bit, **(surroundings or {}))
     if not isinstance(controller, GainTable):
-        return controller
+        return case, controller
     K1, K2 = controller.gains_at(*controller.grid.place_of(case))
     plant = controller.grid.plant
-    return Controller(controller.structure, K1[0], K2[0], plant=plant, **(surroundings or {}))
+    return case, Controller(controller.structure, K1[0], K2[0], plant=plant, **(surroundings or {}))
 
 
 def linear_abscissa(case: Case, controller: Controller | None) -> float:

@@ -16,15 +16,23 @@ from drillctrl.base.checkpoint import Checkpoint
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.workers import Progress
-from drillctrl.charts.chart import chart
-from drillctrl.charts.plane import AxisLike, Plane, make_plane
+from drillctrl.charts.plane import AxisLike, make_plane
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.run import checked_run
 from drillctrl.simulation.starts import possible_starts, start_named
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
+from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.studies.lattice import Node, explore, fine_shape
-from drillctrl.studies.tasks import controller_at, run_tasks
+from drillctrl.studies.tasks import closed_at, run_tasks
+from drillctrl.studies.vibration_edge import (
+    as_closing,
+    held_against,
+    is_long,
+    linear_edge,
+    marked_place,
+)
 from drillctrl.studies.vibration_files import save_map
 from drillctrl.studies.vibration_point import (
     QUANTITIES,
@@ -32,7 +40,8 @@ from drillctrl.studies.vibration_point import (
     as_array,
     measure_point,
 )
-from drillctrl.studies.vibration_text import controller_text, map_summary, place_text
+from drillctrl.studies.vibration_text import closing_text, map_summary, place_text
+from drillctrl.studies.vibration_threshold import torsional_field
 from drillctrl.studies.vibration_values import MapValues, Severity
 from drillctrl.tables.gain_table import GainTable
 
@@ -41,8 +50,6 @@ if TYPE_CHECKING:
 
 STARTS = ("small", "kick", "back")
 _MOST_POINTS = 200_000
-# Strings of more states have no exact boundary within seconds; α at the points stands for it.
-_FEW_STATES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +87,11 @@ class VibrationMap(MapValues):
             raise InputError("difference", "asked for", "left out where there is no control")
         from drillctrl.studies.vibration_figure import Drawn, plot_map
 
-        columns = {"without control": self.uncontrolled}
+        columns = [(closing_text(self, self.against), self.uncontrolled)]
         if self.controlled is not None:
-            columns[controller_text(self)] = self.controlled
+            columns.append((closing_text(self, self.controller), self.controlled))
         drawn = [
-            Drawn(title, {**found.columns(), "boundary": found.boundary})
-            for title, found in columns.items()
+            Drawn(title, {**each.columns(), "boundary": each.boundary}) for title, each in columns
         ]
         return plot_map(
             self.plane,
@@ -97,6 +103,7 @@ class VibrationMap(MapValues):
             difference=difference,
             marked=self.marked,
             title=place_text(self, name),
+            threshold=self.threshold,
         )
 
     def save(self, path: str | Path) -> None:
@@ -111,7 +118,7 @@ class VibrationMap(MapValues):
 
     def __repr__(self) -> str:
         x, y = self.plane.x.name, self.plane.y.name
-        control = "no control" if self.structure is None else self.structure.name
+        control = self.structure or "no control"
         return f"<VibrationMap: {len(self.nodes)} points over {x} × {y}, {control}>"
 
 
@@ -120,12 +127,14 @@ def vibration_map(
     point: Where,
     x: AxisLike = ("omega0", 4.0, 24.0),
     y: AxisLike = ("delta0", 0.5, 12.0),
-    controller: Controller | GainTable | None = None,
+    controller: Controller | GainTable | DriveControl | DriveLaws | None = None,
+    against: Controller | GainTable | DriveControl | DriveLaws | None = None,
     *,
     counts: tuple[int, int] = (15, 12),
     refine: int = 1,
     starts: Sequence[str] = STARTS,
     duration: float = 200.0,
+    threshold: bool = False,
     mark: bool = True,
     surroundings: Mapping[str, Any] | None = None,
     executor: Executor | None = None,
@@ -140,11 +149,14 @@ def vibration_map(
         Supplies all that is no axis.
     x, y : (name, low, high)
         As in `chart`: for a rig ``"speed"`` in rpm, ``"rop"`` in m/h, ``"wob"`` in kN,
-        ``"rock_strength"`` in MPa; else ``"omega0"``, ``"delta0"``, ``"psi"`` and the other
-        groups. Gains are no axes.
-    controller : Controller or GainTable, optional
-        Whose motion is shown beside that without control: the same gains everywhere, or those
-        of a table at each point.
+        ``"rock_strength"`` in MPa, of a string ``"depth"`` in m and ``"mud"``; else
+        ``"omega0"``, ``"delta0"``, ``"psi"`` and the other groups. Gains are no axes.
+    controller : Controller, GainTable, DriveControl or DriveLaws, optional
+        Whose motion is shown beside that without control: the same gains or law of the top
+        drive everywhere, or those of a table at each point.
+    against : Controller, GainTable, DriveControl or DriveLaws, optional
+        In place of no control. Of a rig with a top drive it is a stiff one where nothing is
+        given, for nothing else holds its speed.
     counts : (int, int)
         Points along each axis to begin with.
     refine : int
@@ -154,10 +166,14 @@ def vibration_map(
         Names of starts, as in `simulate_starts`: each point is judged by the worst.
     duration : float
         Of each run, dimensionless.
+    threshold : bool
+        Whether to look as well where torsion has damping left on the axial orbit that is drilled
+        with; see `torsional_threshold`. Not for strings of sections.
     mark : bool
         Whether the operating point is marked, where it lies on the map.
     surroundings : mapping, optional
-        Further arguments of `Controller` for the gains of a table, such as ``limit``.
+        Further arguments of `Controller` for the gains of a table, such as ``limit``, or of
+        `law_controller` for a law.
     executor : concurrent.futures.Executor, optional
         Works on the points side by side; the result does not depend on it.
     checkpoint : Checkpoint, optional
@@ -179,33 +195,43 @@ def vibration_map(
     shape = fine_shape(sizes, refine)
     if shape[0] * shape[1] > _MOST_POINTS:
         raise InputError("refine", refine, f"such that there are at most {_MOST_POINTS} points")
-    if surroundings and not isinstance(controller, GainTable):
-        raise InputError("surroundings", dict(surroundings), "given with a table only")
-    names = _checked_starts(starts, case)
+    law, other = as_closing(controller), held_against(as_closing(against), case)
+    if surroundings and not isinstance(law, GainTable | DriveLaws):
+        raise InputError("surroundings", dict(surroundings), "given with a table or a law only")
     duration = checked_number("duration", duration, 1.0, 1e6)
-    cases: dict[Node, Case] = {}
-    found: list[dict[Node, dict[str, Any]]] = [{}] if controller is None else [{}, {}]
+    cases: dict[Node, list[tuple[Case, Controller | None]]] = {}
+    columns = (other,) if law is None else (other, law)
+    found: list[dict[Node, dict[str, Any]]] = [{} for _ in columns]
+    edges = [linear_edge(plane, closing) for closing in columns]
     steps = np.array([plane.x.span, plane.y.span]) / (np.array(shape) - 1)
 
-    def case_at(node: Node) -> Case:
+    def closed(x: float, y: float) -> list[tuple[Case, Controller | None]]:
+        there, where = plane.case_at(x, y), plane.rig_point_at(x, y)
+        # What surrounds one column holds for another of its kind.
+        return [
+            closed_at(each, there, where, surroundings if type(each) is type(law) else None)
+            for each in columns
+        ]
+
+    def closed_node(node: Node) -> list[tuple[Case, Controller | None]]:
         if node not in cases:
             value = np.array([plane.x.low, plane.y.low]) + np.array(node) * steps
-            cases[node] = plane.case_at(*value.tolist())
+            cases[node] = closed(*value.tolist())
         return cases[node]
 
+    names = _checked_starts(starts, closed_node((0, 0))[-1][0])
     # What cannot be simulated at a corner is refused before anything is.
     for node in ((0, 0), (shape[0] - 1, shape[1] - 1)):
-        there = case_at(node)
-        closing = controller_at(controller, there, surroundings)
-        checked_run(there, controller=closing, duration=duration)
+        for there, closing in closed_node(node):
+            checked_run(there, controller=closing, duration=duration)
 
     def find(nodes: Sequence[Node]) -> dict[Node, str]:
         tasks: list[VibrationTask] = []
         for node in nodes:
-            there = case_at(node)
-            closings = [None, controller_at(controller, there, surroundings)][: len(found)]
-            for closing in closings:
-                tasks.append(VibrationTask(len(tasks), there, closing, names, duration))
+            for (there, closing), edge in zip(closed_node(node), edges, strict=True):
+                # α of a long string takes seconds, and says no more than the edge.
+                alone = edge is None or not is_long(case)
+                tasks.append(VibrationTask(len(tasks), there, closing, names, duration, alone))
         stage = "refine" if found[0] else "simulate"
         entries = run_tasks(measure_point, tasks, executor, checkpoint, progress, stage)
         words = {}
@@ -219,9 +245,17 @@ def vibration_map(
     cells = explore(sizes, refine, find)
     nodes = tuple(sorted(found[0]))
     severities = [
-        _severity([known[node] for node in nodes], _edge(plane, closing))
-        for known, closing in zip(found, (None, controller), strict=False)
+        _severity([known[node] for node in nodes], edge)
+        for known, edge in zip(found, edges, strict=True)
     ]
+    field = None
+    if threshold:
+
+        def torsion(x: float, y: float) -> tuple[Case, tuple[Controller | None, ...]]:
+            pairs = closed(x, y)
+            return pairs[0][0], tuple(closing for _, closing in pairs)
+
+        field = torsional_field(plane, sizes, torsion, executor, checkpoint, progress)
     return VibrationMap(
         plane,
         sizes,
@@ -230,9 +264,11 @@ def vibration_map(
         nodes,
         cells,
         severities[0],
-        severities[1] if controller is not None else None,
-        controller,
-        _place(plane) if mark else None,
+        severities[1] if law is not None else None,
+        law,
+        other,
+        field,
+        marked_place(plane) if mark else None,
         time.perf_counter() - began,
     )
 
@@ -251,35 +287,6 @@ def _severity(entries: list[dict[str, Any]], boundary: tuple[FloatArray, ...] | 
         boundary=boundary,
         **numbers,
     )
-
-
-def _edge(plane: Plane, controller: Controller | GainTable | None) -> tuple[FloatArray, ...] | None:
-    """Return the exact boundary of the linear loop with an ideal controller, where there is one."""
-    plant, _ = plane.case.physics("a map")
-    if isinstance(controller, GainTable) or len(plant.state_names) > _FEW_STATES:
-        return None
-    gains: tuple[Any, ...] = ()
-    if controller is not None:
-        _, K1, K2 = controller.gain_sets()
-        gains = (controller.feedback, K1[0], K2[0])
-    drawn = chart(plane.case, plane.x, plane.y, *gains, tolerance=2e-3)
-    return tuple(
-        np.vstack([curve.points, curve.points[:1]]) if curve.closed else curve.points
-        for curve in drawn.curves
-    )
-
-
-def _place(plane: Plane) -> tuple[float, float] | None:
-    """Return where the operating point lies on the map, if it does."""
-    try:
-        values = [plane.value_of(axis.name) for axis in (plane.x, plane.y)]
-    except InputError:
-        return None
-    inside = all(
-        axis.low <= value <= axis.high
-        for axis, value in zip((plane.x, plane.y), values, strict=True)
-    )
-    return (values[0], values[1]) if inside else None
 
 
 def _checked_counts(counts: tuple[int, int]) -> tuple[int, int]:

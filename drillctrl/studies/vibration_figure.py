@@ -15,6 +15,7 @@ from drillctrl.charts.figure import axis_text
 from drillctrl.charts.plane import Plane
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
 from drillctrl.studies.lattice import Cell, Node, fill
+from drillctrl.studies.vibration_threshold import TORSION, TorsionalField, draw_threshold
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +37,7 @@ OUTCOMES = {
 # Quantity → text of the colour bar, colours, and its range, which ends where values do; None
 # for no other end. The swing of a bit that hardly turns may be any number.
 _COLOURED: dict[str, tuple[str, str, float, float | None]] = {
-    "swing": (axis_name("stick-slip index, swing of the bit's speed"), "YlOrRd", 0.0, 2.0),
+    "swing": (axis_name("stick-slip index"), "YlOrRd", 0.0, 2.0),
     "stick_fraction": (axis_name("time in torsional stick", "%"), "YlOrRd", 0.0, None),
     "off_rock_fraction": (axis_name("time off the rock", "%"), "YlOrRd", 0.0, None),
     "feed": (axis_name("rate of penetration kept", "%"), "YlOrRd_r", 0.0, 100.0),
@@ -82,6 +83,7 @@ def plot_map(
     difference: bool = False,
     marked: tuple[float, float] | None,
     title: str,
+    threshold: TorsionalField | None = None,
 ) -> Figure:
     """Draw quantities over two axes, one row each, with one column for each controller.
 
@@ -101,6 +103,8 @@ def plot_map(
         The operating point.
     title : str
         Above all.
+    threshold : TorsionalField, optional
+        Drawn as the line where torsion has no damping left.
 
     Raises
     ------
@@ -128,9 +132,13 @@ def plot_map(
             _coloured(row, x, y, fields, *_COLOURED[name])
         for ax in changed:
             _change(ax, x, y, fields[-1] - fields[0], name)
+    edge = False
     for row in grid:
-        for ax, each in zip(row, drawn, strict=True):
-            _overlay(ax, x, y, whole(each.columns["spectral_abscissa"]), each, marked)
+        for k, (ax, each) in enumerate(zip(row, drawn, strict=True)):
+            if threshold is not None:
+                draw_threshold(ax, threshold, threshold.growth[k])
+            alpha = whole(each.columns["spectral_abscissa"])
+            edge = _overlay(ax, x, y, alpha, each, marked) or edge
             ax.set_xlim(plane.x.low, plane.x.high)
             ax.set_ylim(plane.y.low, plane.y.high)
     for ax in (*grid[-1], *beside[-1]):
@@ -140,8 +148,9 @@ def plot_map(
     for ax, each in zip(grid[0], drawn, strict=True):
         ax.set_title(headline(each.title, 48), fontsize="medium")
     for ax in beside[0] if difference else ():
-        ax.set_title("change by control", fontsize="medium")
-    _legend(figure, grid, "outcome" in quantities, marked is not None)
+        ax.set_title("change from left to right", fontsize="medium")
+    lines = {"edge": edge, "threshold": threshold is not None, "marked": marked is not None}
+    _legend(figure, grid, "outcome" in quantities, **lines)
     figure.suptitle(title, fontsize="medium")
     return figure
 
@@ -229,19 +238,29 @@ def _overlay(
     alpha: FloatArray,
     drawn: Drawn,
     marked: tuple[float, float] | None,
-) -> None:
-    """Draw the edge of the linear theory, and the operating point."""
+) -> bool:
+    """Draw the edge of the linear theory, if there is one, and the operating point."""
     boundary = drawn.columns["boundary"]
+    edge = bool(boundary) or bool((alpha < 0.0).any() and (alpha > 0.0).any())
     if boundary is not None:
         for curve in boundary:
             ax.plot(curve[:, 0], curve[:, 1], color="black", linewidth=1.3)
-    elif (alpha < 0.0).any() and (alpha > 0.0).any():
+    elif edge:
         ax.contour(x, y, alpha.T, levels=[0.0], colors="black", linewidths=1.3)
     if marked is not None:
         ax.plot(*marked, "*", color="white", markeredgecolor="black", markersize=13, clip_on=False)
+    return edge
 
 
-def _legend(figure: Figure, grid: npt.NDArray[Any], outcomes: bool, marked: bool) -> None:
+def _legend(
+    figure: Figure,
+    grid: npt.NDArray[Any],
+    outcomes: bool,
+    *,
+    edge: bool,
+    threshold: bool,
+    marked: bool,
+) -> None:
     """Say below the pictures what colours and marks mean, as far as they occur."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -253,7 +272,11 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], outcomes: bool, marked: bool
                 handles.append(Patch(facecolor=colour, edgecolor="black", lw=0.4, label=name))
     if any(_is_grey(ax) for ax in grid.ravel()):
         handles.append(Patch(facecolor=_BROKEN, label="not measured: the run broke off"))
-    handles.append(Line2D([], [], color="black", label="edge of linear stability"))
+    if edge:
+        handles.append(Line2D([], [], color="black", label="edge of linear stability"))
+    if threshold:
+        label = "torsion loses its damping, on the motion drilled with"
+        handles.append(Line2D([], [], color=TORSION, linestyle="dashed", label=label))
     if marked:
         handles.append(
             Line2D(

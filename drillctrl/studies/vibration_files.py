@@ -75,7 +75,7 @@ def _netcdf(found: MapValues) -> bytes:
     variables: dict[str, Any] = {}
     severities = {"": found.uncontrolled}
     if found.controlled is not None:
-        severities = {"": found.controlled, "uncontrolled_": found.uncontrolled}
+        severities = {"": found.controlled, f"{found.first}_": found.uncontrolled}
     for prefix, severity in severities.items():
         for name, words in _NUMBERS.items():
             field = fill(found.shape, found.cells, found.nodes, getattr(severity, name))

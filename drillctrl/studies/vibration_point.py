@@ -27,7 +27,7 @@ QUANTITIES = {
 }
 # A motion that is irregular or grows takes ever more steps; a bounded one of 200 units of time
 # takes half of these at most. Waves along a long string take many more.
-_RTOL, _MOST_STEPS, _FEW_STATES = 1e-6, 60_000, 8
+_RTOL, _MOST_STEPS, FEW_STATES = 1e-6, 60_000, 8
 # What ends a run before it can be measured.
 _BROKEN = (Outcome.UNDECIDED, Outcome.TURNS_BACK, Outcome.DIVERGES)
 
@@ -48,6 +48,8 @@ class VibrationTask:
         Names of starts.
     duration : float
         Of each run, dimensionless.
+    linear : bool
+        Whether α of the linear loop is told, which takes seconds of a long string.
     """
 
     index: int
@@ -55,11 +57,12 @@ class VibrationTask:
     controller: Controller | None
     starts: tuple[str, ...]
     duration: float
+    linear: bool = True
 
     @property
     def key(self) -> str:
         """Hash of all that the result depends on."""
-        return task_key(self.case, self.controller, "map", self.starts, self.duration)
+        return task_key(self.case, self.controller, "map", self.starts, self.duration, self.linear)
 
 
 def measure_point(task: VibrationTask) -> dict[str, Any]:
@@ -77,13 +80,13 @@ def measure_point(task: VibrationTask) -> dict[str, Any]:
         rtol=_RTOL,
         # What comes after is no worse a verdict, and takes long.
         backwards="stop",
-        max_steps=_MOST_STEPS if len(plant.state_names) <= _FEW_STATES else 1_000_000,
+        max_steps=_MOST_STEPS if len(plant.state_names) <= FEW_STATES else 1_000_000,
     )
     rows = [_measured(run) for run in made]
     worst = max(rows, key=lambda row: (OUTCOME_NAMED[row["outcome"]].severity, row["swing"] or 0.0))
     entry: dict[str, Any] = {
         "index": task.index,
-        "spectral_abscissa": _abscissa(task),
+        "spectral_abscissa": _abscissa(task) if task.linear else None,
         "outcome": worst["outcome"],
         "start": worst["start"],
     }

@@ -7,12 +7,15 @@ import math
 from drillctrl.base.text import set_out, wrapped
 from drillctrl.charts.axes import Axis
 from drillctrl.charts.plane import held_text
+from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import control_text
-from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.starts import start_named
 from drillctrl.simulation.status import OUTCOME_NAMED
+from drillctrl.strings.drive_laws import DriveLaws
+from drillctrl.studies.tasks import Closing
 from drillctrl.studies.vibration_figure import OUTCOMES
-from drillctrl.studies.vibration_values import MapValues, Severity
+from drillctrl.studies.vibration_values import MapValues, Severity, closing_name
+from drillctrl.tables.gain_table import GainTable
 
 
 def place_text(found: MapValues, name: str | None = None) -> str:
@@ -25,30 +28,37 @@ def place_text(found: MapValues, name: str | None = None) -> str:
     return f"{', '.join(parts)}; {worst}"
 
 
-def controller_text(found: MapValues) -> str:
+def closing_text(found: MapValues, closing: Closing) -> str:
     """Say what closes the loop, its gains in the rig's units."""
-    structure, controller = found.structure, found.controller
-    if structure is None:
+    if closing is None:
         return "without control"
-    if not isinstance(controller, Controller):
-        return f"{structure.name}, gains of a table"
-    _, K1, K2 = controller.gain_sets()
+    if isinstance(closing, DriveLaws):
+        more = f", {len(closing.depths)} laws by depth" if len(closing.depths) > 1 else ""
+        return f"drive under {closing.name}{more}"
+    if isinstance(closing, GainTable):
+        return f"{closing.structure.name}, gains of a table"
+    _, K1, K2 = closing.gain_sets()
     case = found.plane.case
     plant, _ = case.physics("a map")
-    return control_text(structure, K1[0], K2[0], plant, case.told_rig, case.language)
+    assert isinstance(closing.feedback, FeedbackStructure)
+    return control_text(closing.feedback, K1[0], K2[0], plant, case.told_rig, case.language)
 
 
 def map_summary(found: MapValues) -> str:
     """Return a text for people, in lines of at most 80 columns."""
     axes = " and ".join(_range(axis) for axis in (found.plane.x, found.plane.y))
     lines = [("Over", axes), ("Points", _points(found)), ("Held", place_text(found))]
-    if found.controlled is not None:
-        lines.append(("Control", controller_text(found)))
-    both = [("Without", found.uncontrolled), ("With", found.controlled)]
-    for label, severity in both:
+    for label, closing, severity in (
+        ("Without" if found.against is None else "Against", found.against, found.uncontrolled),
+        ("With", found.controller, found.controlled),
+    ):
         if severity is not None:
-            lines.append((label, _counts(severity)))
-            lines.append(("", _worst(severity)))
+            told = [_counts(severity), _worst(severity)]
+            if closing is not None:
+                told.insert(0, closing_text(found, closing))
+            alone = found.controlled is None and closing is not None
+            lines.append(("Held by" if alone else label, told[0]))
+            lines += [("", text) for text in told[1:]]
     if found.marked is not None:
         lines.append(("Marked", _at_mark(found)))
     return f"{wrapped(_verdict(found))}\n{set_out(lines)}"
@@ -77,7 +87,14 @@ def _verdict(found: MapValues) -> str:
     text = f"The bit keeps turning, cutting and up with its feed at {free} of {total} points"
     if found.controlled is None:
         return text
-    return f"{text}, with control at {_calm(found.controlled)}"
+    calm = _calm(found.controlled)
+    if found.against is None:
+        return f"{text}, with control at {calm}"
+    return f"{text} under {_name(found.against)}, under {_name(found.controller)} at {calm}"
+
+
+def _name(closing: Closing) -> str:
+    return str(closing_name(closing))
 
 
 def _counts(severity: Severity) -> str:
@@ -108,6 +125,7 @@ def _at_mark(found: MapValues) -> str:
     text = OUTCOMES[OUTCOME_NAMED[str(found.uncontrolled.outcomes[nearest])]][0]
     if found.controlled is not None:
         text += (
-            f", with control {OUTCOMES[OUTCOME_NAMED[str(found.controlled.outcomes[nearest])]][0]}"
+            f", {'with control' if found.against is None else 'under ' + _name(found.controller)}"
+            f" {OUTCOMES[OUTCOME_NAMED[str(found.controlled.outcomes[nearest])]][0]}"
         )
     return f"nearest at {where}: {text}"

@@ -13,8 +13,11 @@ from drillctrl.charts.plane import Plane
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.status import Outcome
+from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.studies.lattice import Cell, Node, fine_shape
+from drillctrl.studies.tasks import Closing
 from drillctrl.studies.vibration_point import QUANTITIES
+from drillctrl.studies.vibration_threshold import TorsionalField
 from drillctrl.tables.gain_table import GainTable
 
 
@@ -87,11 +90,13 @@ class MapValues:
     cells : tuple of Cell
         Squares between them.
     uncontrolled : Severity
-        Without control.
+        Without control, or with what the controller is held against.
     controlled : Severity or None
         With the controller, if one was given.
-    controller : Controller, GainTable or None
+    controller, against : Controller, GainTable, DriveLaws or None
         Which.
+    threshold : TorsionalField or None
+        Where torsion has damping left, if it was asked for.
     marked : (float, float) or None
         The operating point on the axes.
     elapsed_seconds : float
@@ -106,7 +111,9 @@ class MapValues:
     cells: tuple[Cell, ...]
     uncontrolled: Severity
     controlled: Severity | None
-    controller: Controller | GainTable | None
+    controller: Closing
+    against: Closing
+    threshold: TorsionalField | None
     marked: tuple[float, float] | None
     elapsed_seconds: float
 
@@ -123,11 +130,14 @@ class MapValues:
         return np.asarray(low + places * np.array([self.plane.x.span, self.plane.y.span]))
 
     @property
-    def structure(self) -> FeedbackStructure | None:
-        """What is fed back."""
-        if isinstance(self.controller, GainTable):
-            return self.controller.structure
-        return None if self.controller is None else self.controller.feedback  # type: ignore[return-value]
+    def structure(self) -> str | None:
+        """Name of what closes the loop."""
+        return closing_name(self.controller)
+
+    @property
+    def first(self) -> str:
+        """What the first column is called in tables: without control, or against another."""
+        return "uncontrolled" if self.against is None else "against"
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the table by column: axes, what becomes of the bit, and so without control."""
@@ -139,7 +149,7 @@ class MapValues:
         free = self.uncontrolled.columns()
         if self.controlled is None:
             return {**first, **free}
-        beside = {f"uncontrolled_{name}": values for name, values in free.items()}
+        beside = {f"{self.first}_{name}": values for name, values in free.items()}
         return {**first, **self.controlled.columns(), **beside}
 
     def rows(self) -> list[list[Any]]:
@@ -160,7 +170,7 @@ class MapValues:
             key: {"name": axis.name, "low": axis.low, "high": axis.high, "unit": axis.unit or None}
             for key, axis in (("x", self.plane.x), ("y", self.plane.y))
         }
-        severities = {"uncontrolled": self.uncontrolled, "controlled": self.controlled}
+        severities = {self.first: self.uncontrolled, "controlled": self.controlled}
         columns = self.columns()
         return {
             "schema": "drillctrl/map/1",
@@ -170,11 +180,13 @@ class MapValues:
             "refine": self.refine,
             "starts": list(self.starts),
             "marked": None if self.marked is None else list(self.marked),
-            "structure": None if self.structure is None else self.structure.name,
+            "structure": self.structure,
+            "against": closing_name(self.against),
             **self._gains(),
             "unvouched": self.unvouched(),
             "outcomes": {k: None if s is None else s.counts() for k, s in severities.items()},
             "boundaries": {k: _boundary(s) for k, s in severities.items()},
+            "threshold": None if self.threshold is None else self.threshold.to_dict(),
             "rows": [dict(zip(columns, row, strict=True)) for row in self.rows()],
             "elapsed_seconds": self.elapsed_seconds,
         }
@@ -185,6 +197,15 @@ class MapValues:
             return {"K1": None, "K2": None}
         _, K1, K2 = self.controller.gain_sets()
         return {"K1": K1[0].ravel().tolist(), "K2": K2[0].ravel().tolist()}
+
+
+def closing_name(closing: Closing) -> str | None:
+    """Return the name of what closes a loop; None for nothing."""
+    if closing is None or isinstance(closing, DriveLaws):
+        return None if closing is None else closing.name
+    structure = closing.structure if isinstance(closing, GainTable) else closing.feedback
+    assert isinstance(structure, FeedbackStructure)
+    return structure.name
 
 
 def _boundary(found: Severity | None) -> list[Any] | None:

@@ -284,7 +284,7 @@ def test_weight_on_bit_is_an_axis():
         place = rig_point_at_weight_on_bit(rig, speed * np.pi / 30, 1e3 * weight)
         assert steady_state(place).weight_on_bit == pytest.approx(1e3 * weight)
         assert spectral_abscissas(place)[0] == pytest.approx(0.0, abs=1e-7)
-    with pytest.raises(InputError, match=r"wob \(lower limit\) = 5.0: .* \[7.776"):
+    with pytest.raises(InputError, match=r"wob \(lower limit, kN\) = 5.0: .* \[7.776"):
         chart(rig_point, ("speed", 60.0, 300.0), ("wob", 5.0, 60.0))
     with pytest.raises(InputError, match="another parameter than x = rop"):
         chart(rig_point, ("rop", 1.0, 30.0), ("wob", 20.0, 60.0))

@@ -9,11 +9,13 @@ import pytest
 import scipy.signal
 
 from drillctrl import (
+    DriveMachine,
     InputError,
     OperatingPoint,
     RigPoint,
     axial_orbit,
     bit_response,
+    characteristic_roots,
     check_rig,
     cli,
     drilling_motion,
@@ -22,6 +24,7 @@ from drillctrl import (
     simulate,
     spectral_abscissa,
     string_preset,
+    string_rig,
     table1,
     top_drive_plant,
     torsional_modes,
@@ -36,6 +39,10 @@ from tests.motion.fixed_step import fixed_step_response
 
 # One unit of H of table1, sqrt(I Kt), in N·m·s.
 UNIT = math.sqrt(116.0 * 938.0)
+BIT = (
+    "blades", "bit_radius", "rock_strength", "contact_strength", "wearflat_length",
+    "cutter_inclination", "friction_coefficient", "bit_geometry",
+)  # fmt: skip
 
 
 def rig_point(rpm, rop, **changes):
@@ -203,6 +210,24 @@ def test_modes_of_a_string_are_those_of_its_pipes():
     assert frequencies == pytest.approx([mode.frequency for mode in pipes], rel=5e-3)
     ratios = [-mode.root.real / abs(mode.root) for mode in found]
     assert ratios == pytest.approx([mode.damping_ratio for mode in pipes], rel=0.02)
+
+
+@pytest.mark.parametrize("drive", [None, DriveMachine(2900.0)], ids=["imposed", "driven"])
+def test_the_mode_of_a_real_string_that_drills_smoothly_is_the_root_of_its_linear_system(drive):
+    """Where the axial motion settles, H is the transfer function of the cut."""
+    paper = string_preset("paper-string")
+    pipe, collars = paper.string.sections
+    string = replace(paper.string, sections=(replace(pipe, length=200.0), collars))
+    bit = {name: getattr(paper, name) for name in BIT}
+    case = as_case(RigPoint(string_rig(string, drive=drive, **bit), 5.0 * math.pi, 20.0 / 3600.0))
+    (mode,) = torsional_modes(case, 1)
+    found = mode_at(case, mode, 0.03, most_periods=40)
+    assert found.response.held == 0.0
+    roots = [root.value for root in characteristic_roots(plant_system(case), -0.03)]
+    near = min(roots, key=lambda root: abs(root - found.root))
+    # H is taken on the axis, the root lies beside it.
+    assert found.root == pytest.approx(near, abs=4e-4)
+    assert abs(found.root - mode.root) > 15 * abs(found.root - near)
 
 
 def test_forced_speed_is_that_of_an_ordinary_integrator():

@@ -212,7 +212,7 @@ def test_what_control_changes_is_drawn_beside(found):
     figure = found.plot(("outcome", "swing"), difference=True)
     panels = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
     changed = [ax for ax in panels if ax.get_subplotspec().colspan.start == 2]
-    assert changed[0].get_title() == "change by control"
+    assert changed[0].get_title() == "change from left to right"
     swing = changed[1].collections[0].get_array().filled(np.nan).T.ravel()
     columns = found.columns()
     order = np.lexsort((columns["rop"], columns["speed"]))

@@ -1,0 +1,158 @@
+"""Maps of a string under laws of its top drive, and the threshold of torsional damping."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from drillctrl import (
+    Controller,
+    Damping,
+    DrillString,
+    DriveMachine,
+    InputError,
+    RigPoint,
+    Section,
+    changed_rig,
+    drive_control,
+    drive_table,
+    law_controller,
+    load_laws,
+    simulate,
+    string_rig,
+    table1,
+    torsional_threshold,
+    vibration_map,
+)
+from drillctrl.cli import main
+from drillctrl.simulation.outcome import figures
+from drillctrl.simulation.starts import start_named
+
+STRING = DrillString(
+    (
+        Section("pipe", "pipe", 300.0, 0.127, 0.1086),
+        Section("collars", "collar", 60.0, 0.17, 0.07),
+    ),
+    Damping(axial=0.5, torsional=0.2),
+)
+RIG = string_rig(
+    STRING, drive=DriveMachine(1500.0, torque_limit=30e3), bit_radius=0.108, blades=4,
+    rock_strength=60e6, contact_strength=60e6, wearflat_length=1e-3, cutter_inclination=0.6,
+    friction_coefficient=0.6, bit_geometry=1.0,
+)  # fmt: skip
+POINT = RigPoint(RIG, 120 * pi / 30, 10 / 3600)
+QUICK = {"counts": (2, 2), "refine": 0, "starts": ("kick",), "duration": 30.0}
+SPEED, ROP = ("speed", 80.0, 160.0), ("rop", 5.0, 15.0)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return vibration_map(
+        POINT, SPEED, ROP, drive_control("soft-torque", RIG), drive_control("z-torque", RIG),
+        **QUICK,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("column", "law"), [("", "soft-torque"), ("against_", "z-torque")])
+def test_each_column_is_what_runs_under_its_law_do(found, column, law):
+    columns = found.columns()
+    k = next(i for i in range(4) if (columns["speed"][i], columns["rop"][i]) == (80.0, 15.0))
+    where = RigPoint(RIG, 80 * pi / 30, 15 / 3600)
+    case, controller = law_controller(where, drive_control(law, RIG))
+    start = start_named("kick").scenario(where.operating_point())
+    run = simulate(case, controller, duration=30.0, scenario=start, rtol=1e-6)
+    assert columns[f"{column}swing"][k] == pytest.approx(figures(run).swing, rel=1e-6)
+    assert columns[f"{column}outcome"][k] == str(figures(run).outcome)
+
+
+def test_the_difference_is_between_the_two_laws(found):
+    figure = found.plot(("swing",), difference=True)
+    titles = [ax.get_title() for ax in figure.axes if ax.get_title()]
+    assert titles == [
+        "drive under z-torque",
+        "drive under soft-torque",
+        "change from left to right",
+    ]
+    told = found.to_dict()
+    assert (told["structure"], told["against"]) == ("soft-torque", "z-torque")
+    assert set(told["outcomes"]) == {"against", "controlled"}
+    assert "under z-torque, under soft-torque" in found.summary().replace("\n", " ")
+
+
+def test_a_rig_with_a_top_drive_is_held_by_a_stiff_one():
+    alone = vibration_map(POINT, SPEED, ROP, **QUICK)
+    stiff = vibration_map(POINT, SPEED, ROP, drive_control("stiff", RIG), **QUICK)
+    np.testing.assert_array_equal(alone.uncontrolled.swing, stiff.controlled.swing)
+    assert alone.to_dict()["against"] == "stiff"
+
+
+def test_laws_of_a_table_are_those_of_each_depth(tmp_path):
+    made = drive_table(RIG, "soft-torque", [300.0, 420.0])
+    (tmp_path / "laws.csv").write_text(made.to_csv())
+    (tmp_path / "laws.json").write_text(json.dumps(made.to_dict()))
+    for name in ("laws.csv", "laws.json"):
+        laws = load_laws(tmp_path / name, RIG.drive)
+        for depth in (300.0, 350.0, 370.0, 420.0):
+            assert laws.at(depth).speed == made.laws.at(depth).speed
+    quick = {**QUICK, "duration": 10.0}
+    found = vibration_map(POINT, SPEED, ("depth", 300.0, 420.0), made.laws, made.laws, **quick)
+    k = next(i for i, at in enumerate(found.points.tolist()) if at == [80.0, 420.0])
+    deep = RigPoint(changed_rig(RIG, depth=420.0), 80 * pi / 30, 10 / 3600)
+    case, controller = law_controller(deep, made.drives[1].control)
+    start = start_named("kick").scenario(deep.operating_point())
+    run = simulate(case, controller, duration=10.0, scenario=start, rtol=1e-6)
+    assert found.controlled.swing[k] == pytest.approx(figures(run).swing, rel=1e-6)
+    with pytest.raises(InputError, match="table"):
+        load_laws(tmp_path / "none.csv", RIG.drive)
+    (tmp_path / "bad.csv").write_text("depth,stable,\n1,2\n")
+    with pytest.raises(InputError, match="laws of a top drive"):
+        load_laws(tmp_path / "bad.csv", RIG.drive)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--against", "stiff"), "--against"),
+        (("--structure", "stiff"), "--structure"),
+        (("--rig", "table1", "--structure", "stiff"), "rig"),
+        (("--structure", "pd", "--K1", "-1,-1", "--against", "pd; K3=1"), "--against"),
+    ],
+)
+def test_bad_input_is_refused(capsys, arguments, named):
+    where = ("--speed", "120 rpm", "--rop", "20 m/h") if "table1" in arguments else ()
+    with pytest.raises(SystemExit) as stop:
+        main(["map", *arguments, *where])
+    error = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert named in error
+    assert error.count("\n") == 1
+
+
+def test_torsion_loses_its_damping_where_the_threshold_along_speed_has_it():
+    """On a rig with little damping of its own, which the bit takes away at low speed."""
+    rig = replace(table1(), torsional_damping=14.0)
+    where = RigPoint(rig, 120 * pi / 30, 20 / 3600)
+    (edge,) = torsional_threshold(where, "speed", least=0.9, most=1.2).thresholds
+    low, high = edge.low * 120, edge.high * 120
+    axes = ("speed", low - 6.0, high + 6.0), ("rop", 19.9, 20.1)
+    gains = Controller("pd", [0.0, -0.5])
+    quick = {"counts": (2, 2), "refine": 0, "starts": ("small",), "duration": 5.0}
+    found = vibration_map(where, *axes, gains, threshold=True, **quick)
+    free, held = found.threshold.growth
+    assert edge.decays == "above"
+    assert (free[0] > 0.0).all()
+    assert (free[1] < 0.0).all()
+    # Gains on the bit's speed damp by what they are, whatever the bit answers.
+    finite = np.isfinite(free)
+    unit = 1.0 / rig.time_scale
+    np.testing.assert_allclose((held - free)[finite], -0.25 * unit, rtol=0.1)
+    assert found.to_dict()["threshold"]["grows"][0][0] == [True, True]
+
+
+def test_a_string_of_sections_has_no_threshold():
+    with pytest.raises(InputError, match="threshold"):
+        vibration_map(POINT, SPEED, ROP, threshold=True, **QUICK)
