@@ -46,6 +46,13 @@ def counts(number: int) -> None:
         agree += reduced == exact
         if reduced != exact:
             print(f"case {i}: {reduced} reduced, {exact} exact", flush=True)
+            for root in characteristic_roots(system, 0.0):
+                # What the exact string has elsewhere may lie beyond the band of the reduced one.
+                hertz = abs(root.value) * loop.rate / (2.0 * np.pi)
+                off = abs(loop.root(root.value) - root.value)
+                print(f"  root {root.value:.4g} at {hertz:.3g} Hz, {off:.2g} from the exact one")
+        if i % 50 == 49:
+            print(f"{agree} of {i + 1}", flush=True)
         if i < _COMPARED * number:
             for root in characteristic_roots(system, -0.3):
                 if abs(root.value) * loop.rate < 20.0 * np.pi:

@@ -68,10 +68,9 @@ def _of_drive(found: ReportValues) -> list[str]:
     """Say how to set the drive, and what that changes."""
     assert found.drives is not None
     stiff, law = found.drives.drives[0], found.drives.drives[-1]
-    if not law.stable:
-        return [
-            f"Do not use {law.control.name} on this string: it makes the string swing by itself."
-        ]
+    if not law.verdict.recommended:
+        reason = law.verdict.reason(found.language)
+        return [f"Do not use {law.control.name} on this string: {reason}."]
     if not found.recommended:
         return [f"Do not use {law.control.name} here: in the run the bit did worse with it."]
     told = [setting_sentence(law.control, found.language)]

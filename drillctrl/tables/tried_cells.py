@@ -9,6 +9,7 @@ from drillctrl.designs.trials import Trial
 from drillctrl.designs.verdict import FAILURES, try_gains
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.tables.cells import CellTask
+from drillctrl.tables.crossings import crosses
 from drillctrl.tables.interpolation import (
     INTERPOLATED,
     UNSAFE,
@@ -24,7 +25,8 @@ def try_cells(task: CellTask) -> tuple[IntArray, Cells]:
     """Try the interpolated gains in the middle of some cells, beside no control.
 
     A cell passes if the gains of all its corners are recommended, and those in its middle do no
-    harm from any start of the trials and leave the bit neither stalled nor behind its feed.
+    harm from any start of the trials and leave the bit neither stalled nor behind its feed; nor
+    those that follow the point across it, see `crosses`.
 
     Returns
     -------
@@ -38,7 +40,9 @@ def try_cells(task: CellTask) -> tuple[IntArray, Cells]:
     where = place(grid, at)
     vectors = interpolated(where, task.gains, None)
     mode, alphas = [], []
-    for corners, coordinates, gains in zip(where.corners, at, vectors, strict=True):
+    for cell, corners, coordinates, gains in zip(
+        task.cells.tolist(), where.corners, at, vectors, strict=True
+    ):
         case = grid.case(*coordinates.tolist())
         K1, K2 = structure.gains(gains)
         alphas.append(
@@ -50,6 +54,7 @@ def try_cells(task: CellTask) -> tuple[IntArray, Cells]:
                 case, structure, K1, K2, False, spare=True, surroundings=task.surroundings
             )
             passed = not verdict.harm and not any(map(_fails, verdict.trials))
+            passed = passed and crosses(task, cell)
         mode.append(INTERPOLATED if passed else UNSAFE)
     return task.cells, Cells(np.array(mode), np.array(alphas), np.zeros_like(vectors))
 

@@ -17,6 +17,8 @@ from drillctrl import (
 )
 from drillctrl.designs.trials import STARTS, trial_run
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.tables.cells import CellTask
+from drillctrl.tables.crossings import crosses
 from drillctrl.tables.scheduling import scheduled
 
 QUICK = Drilling(kick=0.03)
@@ -57,6 +59,16 @@ def test_gains_between_nodes_do_no_harm(made):
     for start in STARTS:
         mine, free = trial_run(middle, controller, start), trial_run(middle, None, start)
         assert mine.swing <= free.swing + 0.02
+
+
+def test_gains_follow_the_point_across_a_cell(made):
+    """From 110 to 120 rpm and back they do no harm; with their sign turned they do."""
+
+    def task(gains):
+        return CellTask(made.grid, made.structure, gains, made.sound, np.array([1]), {"limit": 1.0})
+
+    assert crosses(task(made.gains), 1)
+    assert not crosses(task(-2.0 * made.gains), 1)
 
 
 def test_a_file_keeps_what_was_found(made, tmp_path):
