@@ -24,8 +24,8 @@ from drillctrl.charts.stabilisable_scan import bounded_margin, reached_line
 _SPARSE_LINES, _SPARSE = 2, 4
 # At which of those, line after line: together they are all samples.
 _STAGGERED = (0, 2, 1, 3)
-# Lines of less relative distance have much the same gains in reach.
-_APART = 0.06
+# Lines of less relative distance have much the same gains in reach: each takes other samples.
+_APART = 0.2
 # Evaluations of a descent from gains very near.
 _FEW_STEPS = 40
 # Wanted accuracy of a crossing, as a share of the line.
@@ -63,9 +63,9 @@ class SearchedScan:
         cheap = sorted(positions.tolist(), key=lambda x: self.searched.delay(x, self.high))
         looked: list[float] = []
         for i, x in enumerate(cheap):
-            apart = all(abs(x - other) > _APART * abs(x) for other in looked)
-            sparse = first and i % _SPARSE_LINES == 0 and apart
-            offset = _STAGGERED[len(looked) % _SPARSE]
+            alike = sum(abs(x - other) <= _APART * abs(x) for other in looked)
+            sparse = first and i % _SPARSE_LINES == 0 and alike < _SPARSE
+            offset = _STAGGERED[alike % _SPARSE]
             looked += [x] * sparse
             beside = self._beside(x)
             line: list[Place | None] = []
