@@ -22,8 +22,10 @@ from drillctrl.charts.stabilisable_scan import bounded_margin, reached_line
 
 # On every so many of the first lines the whole box is searched at every so many samples.
 _SPARSE_LINES, _SPARSE = 2, 4
-# Lines of less relative distance have much the same gains in reach.
-_APART = 0.06
+# At which of those, line after line: together they are all samples.
+_STAGGERED = (0, 2, 1, 3)
+# Lines of less relative distance have much the same gains in reach: each takes other samples.
+_APART = 0.2
 # Evaluations of a descent from gains very near.
 _FEW_STEPS = 40
 # Wanted accuracy of a crossing, as a share of the line.
@@ -61,8 +63,9 @@ class SearchedScan:
         cheap = sorted(positions.tolist(), key=lambda x: self.searched.delay(x, self.high))
         looked: list[float] = []
         for i, x in enumerate(cheap):
-            apart = all(abs(x - other) > _APART * abs(x) for other in looked)
-            sparse = first and i % _SPARSE_LINES == 0 and apart
+            alike = sum(abs(x - other) <= _APART * abs(x) for other in looked)
+            sparse = first and i % _SPARSE_LINES == 0 and alike < _SPARSE
+            offset = _STAGGERED[alike % _SPARSE]
             looked += [x] * sparse
             beside = self._beside(x)
             line: list[Place | None] = []
@@ -73,7 +76,7 @@ class SearchedScan:
                     for j in range(max(0, k - 1), min(k + 2, self.samples))
                 ]
                 if first or any(_stable(place) for place in near):
-                    line.append(self.searched.known(x, y, search=sparse and k % _SPARSE == 0))
+                    line.append(self.searched.known(x, y, search=sparse and k % _SPARSE == offset))
                 else:
                     line.append(None)
             self._lines[x] = line

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 # Share of x by which lines are apart at least: those that need a search cost more.
 _NARROWEST, _NARROWEST_SEARCHED = 3e-3, 2.5e-2
+# The same relative to x itself, and how far apart lines are at first, with five at least.
+_SAME, _LIKE, _FEWEST = 0.01, 0.03, 5
 # Roots of loops with longer delays crowd the axis, and gains that tame them are not looked for.
 _LONGEST_DELAY = 6.3
 
@@ -217,7 +219,8 @@ def stabilisable_chart(
     tolerance : float
         Wanted relative error of the area.
     first_lines : int
-        Evenly spaced lines of constant x to begin with.
+        Evenly spaced lines of constant x to begin with; fewer where more than two gains are
+        searched for over a narrow range of x.
     samples : int
         Places looked at on each line before refinement: islands narrower than their
         distance may be missed.
@@ -266,13 +269,16 @@ def stabilisable_chart(
         )  # fmt: skip
     else:
         scanner = SearchedScan(searched, low, plane.y.high, samples, count)
+    # Over a narrow range of x gains hardly change from line to line.
+    share = abs(start) / (plane.x.high - start)
+    fewest = min(first_lines, max(_FEWEST, math.ceil(1.0 / max(_LIKE * share, 1e-3))))
     result = sweep(
         scanner,
         start,
         plane.x.high,
         tolerance=tolerance,
-        first=first_lines,
-        narrowest=_NARROWEST if curves else _NARROWEST_SEARCHED,
+        first=first_lines if curves else fewest,
+        narrowest=_NARROWEST if curves else max(_NARROWEST_SEARCHED, _SAME * share),
         inset=0.0,
     )
     accuracy = CROSSING_TOLERANCE if curves else SEARCHED_TOLERANCE

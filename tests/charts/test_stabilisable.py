@@ -15,9 +15,10 @@ from drillctrl import (
     preset_structure,
     stabilisable_chart,
 )
-from drillctrl.charts.decisions import Searched, by_curves
+from drillctrl.charts.decisions import Place, Searched, by_curves
 from drillctrl.charts.figure import plot_charts
 from drillctrl.charts.plane import make_plane
+from drillctrl.charts.searched_scan import SearchedScan
 from drillctrl.cli import main
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.gain_margin import gain_margin
@@ -121,6 +122,33 @@ def test_four_gains_reach_a_band_of_depths_at_low_speed():
         ((low, high, _, _),) = line.stable_intervals
         assert 3.2 < low < 5.0
         assert high > 15.0
+
+
+class Unreachable:
+    """In the place of `Searched`: remembers where the whole box was searched, and finds nothing."""
+
+    def __init__(self):
+        self.asked = []
+
+    def delay(self, x, y):
+        return 1.0 / x
+
+    def known(self, x, y, *, search):
+        self.asked += [(x, y)] * search
+        return Place(x, y, np.zeros(4), 1.0, stable=False)
+
+
+@pytest.mark.parametrize(("low", "high", "together"), [(0.6, 0.75, True), (0.5, 25.0, False)])
+def test_lines_that_are_alike_share_the_samples_that_are_searched(low, high, together):
+    asked = Unreachable()
+    SearchedScan(asked, 0.0, 7.0, 8, lambda: None)(np.linspace(low, high, 9))
+    depths = [y for _, y in asked.asked]
+    if together:
+        # All samples, though none twice over but for the few lines that are far apart.
+        assert set(depths) == set(range(8))
+        assert len(depths) <= 12
+    else:
+        assert set(depths) == {0.0, 4.0}
 
 
 def test_search_and_curves_agree():
