@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from drillctrl.base.language import SI, Language
+from drillctrl.base.text import wrapped
 from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
@@ -53,6 +54,8 @@ def comparison_summary(
     width = max(len(label) for label, _ in rows) + 2
     columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
     head = [
+        wrapped(_advice(drives, falling, language)),
+        "",
         f"{language.text('depth', rig.string.length, 6)} of string, "
         f"{per * line.wave_impedance:.4g} {slope} of the uppermost pipe,",
         drive_text(machine, language),
@@ -65,6 +68,31 @@ def comparison_summary(
         for label, cells in rows
     ]
     return "\n".join([*head, *table])
+
+
+def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: Language) -> str:
+    """Say what to set of the drive that stands most, and above which speed to stay with it."""
+    best = max(drives, key=lambda drive: drive.smallest_slope)
+    if not best.stable:
+        return "None of these: under each the string swings by itself."
+    told = setting_sentence(best.control, language)
+    speed = threshold_speed(best)
+    if not math.isfinite(speed):
+        return told
+    others = [drive for drive in drives if drive is not best]
+    beside = ", ".join(
+        f"{_rpm(threshold_speed(drive)):.3g} under {drive.control.name}"
+        for drive in others
+        if drive.stable and math.isfinite(threshold_speed(drive))
+    )
+    fall = language.text("torque", falling.drop, 3)
+    told += f" Stay above {_rpm(speed):.3g} rpm with it{f' ({beside})' if beside else ''}, if the"
+    return f"{told} bit's torque falls by {fall} as it turns faster (a guess: measure it)."
+
+
+def threshold_speed(drive: DriveMeasures) -> float:
+    """Return the speed above which all modes looked at stand the falling torque, rad/s."""
+    return max(mode.threshold_speed for mode in drive.modes)
 
 
 def _weakest(drive: DriveMeasures, per: float) -> str:
