@@ -79,7 +79,9 @@ def verdict(system: DelaySystem, further: float) -> tuple[str, str]:
         return "refused", f"abscissa: {error}"
     top = roots[0]
     scale = abs(top.value) + 1.0 / system.max_delay
-    room = 1e-6 * scale + 10.0 * max(root.error + root.spread for root in roots[:3])
+    # A root that may lie anywhere by its condition is looked for nearby all the same.
+    error = 10.0 * max(root.error + root.spread for root in roots[:3])
+    room = 1e-6 * scale + min(error, 0.1 * scale)
     if not abs(alpha - top.rightmost) <= room:
         return "silent", f"abscissa {alpha!r}, first root {top.rightmost!r}"
     right = count_right_of(system, alpha + room).count

@@ -162,7 +162,8 @@ def test_of_roots():
     assert check(analyze(POINT).plot()) == {"dimensionless"}
 
 
-def test_of_charts():
+def test_of_charts(monkeypatch):
+    monkeypatch.setattr("drillctrl.charts.chart.FIRST_LINES", 13)
     over = chart(DRILLING, ("speed", 60.0, 180.0), ("rop", 5.0, 30.0), tolerance=1e-2)
     drawn = over.plot(name="my rig")
     assert check(drawn, "rpm", "m/h", "Hz") == {"rpm", "m/h", "Hz"}

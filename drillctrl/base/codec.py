@@ -46,32 +46,41 @@ def encode(value: Any, classes: Mapping[str, type[Any]], special: Special = lamb
     TypeError
         If something is of a class that is not listed.
     """
-    own = special(value)
-    if own is not None:
-        return own
-    name = type(value).__name__
-    made: Any = value
-    if name in classes and type(value) is classes[name]:
-        if isinstance(value, enum.Enum):
-            return {"is": name, "value": value.value}
-        items = [field.name for field in dataclasses.fields(made)]
-        inside = {item: encode(getattr(value, item), classes, special) for item in items}
-        return {"is": name, **inside}
-    if value is None or isinstance(value, bool | str):
-        return value
-    if isinstance(value, np.ndarray):
-        kind = "str" if value.dtype.kind == "U" else value.dtype.name
-        if kind not in _KINDS:
-            raise TypeError(f"an array of {value.dtype}")
-        flat = [_number(item) for item in value.ravel().tolist()]
-        return {"array": kind, "shape": list(value.shape), "values": flat}
-    if isinstance(value, int | float | complex | np.number):
-        return _number(value.item() if isinstance(value, np.number) else value)
-    if isinstance(value, tuple | list):
-        return [encode(item, classes, special) for item in value]
-    if isinstance(value, Mapping):
-        return {"map": {str(k): encode(v, classes, special) for k, v in value.items()}}
-    raise TypeError(f"a {name}")
+    names = {kind: name for name, kind in classes.items()}
+
+    def inner(value: Any) -> Any:
+        own = special(value)
+        if own is not None:
+            return own
+        name = names.get(type(value))
+        if name is not None:
+            if isinstance(value, enum.Enum):
+                return {"is": name, "value": value.value}
+            return {"is": name, **{item: inner(getattr(value, item)) for item in _fields(value)}}
+        if value is None or isinstance(value, bool | str):
+            return value
+        if isinstance(value, np.ndarray):
+            kind = "str" if value.dtype.kind == "U" else value.dtype.name
+            if kind not in _KINDS:
+                raise TypeError(f"an array of {value.dtype}")
+            flat = [_number(item) for item in value.ravel().tolist()]
+            return {"array": kind, "shape": list(value.shape), "values": flat}
+        if isinstance(value, int | float | complex | np.number):
+            return _number(value.item() if isinstance(value, np.number) else value)
+        if isinstance(value, tuple | list):
+            return [inner(item) for item in value]
+        if isinstance(value, Mapping):
+            return {"map": {str(k): inner(v) for k, v in value.items()}}
+        raise TypeError(f"a {type(value).__name__}")
+
+    return inner(value)
+
+
+def _fields(kind: Any) -> tuple[str, ...]:
+    """Return the names of the fields of a dataclass or named tuple, or of one of its values."""
+    if hasattr(kind, "_fields"):
+        return tuple(kind._fields)
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 def decode(
@@ -119,9 +128,12 @@ def decode(
     rest = {key: value for key, value in data.items() if key != "is"}
     if issubclass(kind, enum.Enum):
         return kind(rest["value"])
-    types = {field.name: str(field.type) for field in dataclasses.fields(kind)}
-    # What came later has a default.
-    later = {f.name for f in dataclasses.fields(kind) if f.default is not dataclasses.MISSING}
+    types = dict.fromkeys(_fields(kind), "object")
+    later: set[str] = set()
+    if dataclasses.is_dataclass(kind):
+        types = {field.name: str(field.type) for field in dataclasses.fields(kind)}
+        # What came later has a default.
+        later = {f.name for f in dataclasses.fields(kind) if f.default is not dataclasses.MISSING}
     if not set(types) - later <= set(rest) <= set(types):
         raise ValueError(f"a {data['is']} with other entries than {', '.join(sorted(types))}")
     values = {name: inner(value) for name, value in rest.items()}

@@ -58,7 +58,8 @@ def blamed_on(source: str, typed: Mapping[str, tuple[str, object]]) -> Iterator[
         if error.parameter not in typed:
             raise
         (key, value), permitted = typed[error.parameter], error.permitted
-        if isinstance(value, str) and value != error.value:
+        # What was refused as a text has its unit.
+        if isinstance(value, str) and not isinstance(error.value, str):
             permitted = f"{permitted} in SI units"
         raise InputError(f"{key} in {source}", value, permitted) from None
 
@@ -86,6 +87,7 @@ def checked_number(
     high: float = math.inf,
     *,
     open_low: bool = False,
+    unit: str = "",
 ) -> float:
     """Return ``value`` as a float, or raise if it is no finite number in the interval.
 
@@ -99,6 +101,8 @@ def checked_number(
         The closed interval of permitted values.
     open_low : bool
         Exclude ``low`` itself.
+    unit : str
+        Of the value and the interval, for the message.
 
     Raises
     ------
@@ -109,7 +113,11 @@ def checked_number(
         value = number = float(value)
         if low <= number <= high and math.isfinite(number) and not (open_low and number == low):
             return number
-    raise InputError(parameter, value, interval_text(low, high, open_low=open_low))
+    permitted = interval_text(low, high, open_low=open_low)
+    if not unit:
+        raise InputError(parameter, value, permitted)
+    shown = f"{value:g} {unit}" if isinstance(value, float) else value
+    raise InputError(parameter, shown, f"{permitted} {unit}")
 
 
 def checked_integer(parameter: str, value: object, low: int, high: int) -> int:

@@ -127,7 +127,7 @@ def make_axis(
             # The wear flat carries this much before anything is cut.
             idle = steady_state(replace(case.rig_point, penetration_rate=0.0)).weight_on_bit
             floor = idle / to_si_factor(name, language)
-    of = f", {unit}" if name in STRING_AXES else ""
+    of = f", {unit}" if unit else ""
     low = checked_number(f"{name} (lower limit{of})", low, floor, ceiling)
     high = checked_number(f"{name} (upper limit{of})", high, floor, ceiling)
     if not low < high:

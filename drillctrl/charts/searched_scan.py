@@ -22,6 +22,8 @@ from drillctrl.charts.stabilisable_scan import bounded_margin, reached_line
 
 # On every so many of the first lines the whole box is searched at every so many samples.
 _SPARSE_LINES, _SPARSE = 2, 4
+# Lines of less relative distance have much the same gains in reach.
+_APART = 0.06
 # Evaluations of a descent from gains very near.
 _FEW_STEPS = 40
 # Wanted accuracy of a crossing, as a share of the line.
@@ -57,8 +59,11 @@ class SearchedScan:
         first = not self._lines
         # The longer a delay the dearer a search: begin where it is short.
         cheap = sorted(positions.tolist(), key=lambda x: self.searched.delay(x, self.high))
+        looked: list[float] = []
         for i, x in enumerate(cheap):
-            sparse = first and i % _SPARSE_LINES == 0
+            apart = all(abs(x - other) > _APART * abs(x) for other in looked)
+            sparse = first and i % _SPARSE_LINES == 0 and apart
+            looked += [x] * sparse
             beside = self._beside(x)
             line: list[Place | None] = []
             for k, y in enumerate(at):

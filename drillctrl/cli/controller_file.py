@@ -100,10 +100,12 @@ def check_out(
     if out is None:
         return
     if ending not in CONTROLLERS:
-        from drillctrl.tables.files import check_table_path
+        from drillctrl.tables.files import ENDINGS, check_table_path
 
-        with naming("--out", "table"):
-            check_table_path(out)
+        if ending not in ENDINGS:
+            wanted = f"a file that ends in {', '.join((*ENDINGS, *CONTROLLERS))}"
+            raise InputError("--out", out, wanted)
+        check_table_path(out)
         return
     from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
     from drillctrl.tables.export_st import check_st_name

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import writing
 from drillctrl.cli.verb import naming
@@ -54,18 +56,25 @@ def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> Non
     Raises
     ------
     InputError
-        If a law cannot be sampled so, or the file not be written.
+        If a law does harm to its string, cannot be sampled so, or the file not be written.
     """
-    from drillctrl.strings.drive_sampled import sampled_drive, sampled_radius
+    from drillctrl.strings.drive_sampled import sampled_drive
+    from drillctrl.strings.drive_sampled_loop import sampled_slopes
     from drillctrl.tables.export_drive import export_drive
 
+    if found.harm is not None:
+        wanted = f"a law that does no harm before it is exported: at {found.harm}"
+        raise InputError("--structure", found.structure, wanted)
     given = {name: value for name, value in settings.items() if name != "fmi"}
     controls = [drive.control for drive in found.drives]
     law = sampled_drive(controls, depths=found.depths, **given)
-    radius = sampled_radius(law, found.rig.string.torsion.wave_impedance)  # type: ignore[attr-defined]
-    if radius > 1.0 + 1e-6:
-        wanted = f"shorter: with it drive and pipe alone swing up, {radius:.3g}-fold a sample"
-        raise InputError("--period", f"{law.period:g} s", wanted)
+    with naming("--period", "period"):
+        stands = sampled_slopes(law, found.rig)
+    click.echo(
+        f"drillctrl: sampled every {1e3 * law.period:g} ms the string stands "
+        f"{min(stands):.4g} N·m·s",
+        err=True,
+    )
 
     def write() -> None:
         export_drive(law, out, fmi=settings["fmi"])

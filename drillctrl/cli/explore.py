@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import math
 import os
@@ -40,6 +39,8 @@ def explore_command(port: int, no_browser: bool, **point: Any) -> None:
     checked_integer("port", port, 0, 65535)
     where = read_point(point)
     required("tornado", "explore")
+    import asyncio
+
     from drillctrl.explorer.server import bound, serve
 
     initial = _state(where, point)

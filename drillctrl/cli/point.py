@@ -130,8 +130,6 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     speed = units.to_si("--speed", given["speed"], units.ROTARY_SPEED)
     if not speed > 0.0:
         raise InputError("--speed", given["speed"], "above 0: the sense in which the bit cuts")
-    if "rop" in given and units.to_si("--rop", given["rop"], units.SPEED) < 0.0:
-        raise InputError("--rop", given["rop"], "at least 0 m/h")
     if "wob" in given:
         weight = units.to_si("--wob", given["wob"], units.FORCE)
         point = rig_point_at_weight_on_bit(rig, speed, weight)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -18,6 +20,10 @@ _OF_THE_LOOP = (
     *("omega0", "delta0", "psi", "eta", "xi", "kappa", "damping", "blades"),
     *("rig", "speed", "rop", "wob", "rock_strength", "structure", "k1", "k2"),
 )
+# A number and a unit: 1e12 is no 1 of a unit e12.
+_TYPED = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?![eE][-+]?\d+\s*$)([A-Za-z'\"].*?)\s*")
+# Numbers of a rig's point → the options that they are typed with.
+_OF_THE_RIG = {"rotary_speed": "--speed", "penetration_rate": "--rop", "weight_on_bit": "--wob"}
 
 
 def with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
@@ -66,10 +72,39 @@ class Verb(click.Command):
         """Run the command."""
         flags = {parameter.name: parameter.opts[0] for parameter in self.params if parameter.name}
         with contextlib.ExitStack() as stack:
-            for name, flag in flags.items():
+            stack.enter_context(_as_typed(ctx, flags))
+            for name, flag in (*flags.items(), *_OF_THE_RIG.items()):
                 stack.enter_context(naming(flag, name))
             stack.enter_context(_naming_the_loop(ctx, flags))
             return super().invoke(ctx)
+
+
+@contextlib.contextmanager
+def _as_typed(ctx: click.Context, flags: Mapping[str, str]) -> Iterator[None]:
+    """Say a number that was typed with a unit, and what is permitted, in that unit."""
+    try:
+        yield
+    except InputError as error:
+        named = {flag: ctx.params.get(name) for name, flag in flags.items()}
+        typed = named.get(error.parameter)
+        parts = _TYPED.fullmatch(typed) if isinstance(typed, str) else None
+        if parts is None or not isinstance(error.value, float | int):
+            raise
+        permitted = _in_units(error.permitted, float(parts[1]), float(error.value), parts[2])
+        raise InputError(error.parameter, typed, permitted) from None
+
+
+def _in_units(permitted: str, number: float, value: float, unit: str) -> str:
+    """Return an interval of `interval_text` in the unit in which ``value`` is ``number``."""
+    limits = re.search(r"([\[(])(\S+), (\S+)([\])])", permitted)
+    if limits is None:
+        return permitted
+    low, high = float(limits[2]), float(limits[3])
+    factor = number / value if value else 1.0
+    if not value and not {abs(low), abs(high)} <= {0.0, math.inf}:
+        return f"{permitted} in the unit of the model"
+    told = re.sub(r"^ \w+", "", permitted[limits.end() :])
+    return f"in {limits[1]}{low * factor:.5g}, {high * factor:.5g}{limits[4]} {unit}{told}"
 
 
 @contextlib.contextmanager

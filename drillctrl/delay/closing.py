@@ -101,12 +101,7 @@ def with_terms(
         term = drive @ ((lags == lag) * gains).sum(axis=0) @ measure
         matrices[lag] = matrices[lag] + term if lag in matrices else term
     delays = tuple(sorted(matrices))[1:]
-    return replace(
-        system,
-        A0=matrices[0.0],
-        delayed=tuple(matrices[tau] for tau in delays),
-        delays=delays,
-    )
+    return system.with_matrices(matrices[0.0], [matrices[tau] for tau in delays], delays)
 
 
 def feedback_lags(

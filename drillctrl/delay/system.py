@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -150,6 +151,33 @@ class DelaySystem:
                 return matrix
         return np.zeros_like(self.A0)
 
+    def with_matrices(
+        self, A0: FloatArray, delayed: Sequence[FloatArray], delays: tuple[float, ...]
+    ) -> DelaySystem:
+        """Return the system with other matrices of its states, all else as it is.
+
+        Parameters
+        ----------
+        A0, delayed : array and sequence of array, (n, n)
+            As of the system.
+        delays : tuple of float
+            Of these, > 0, strictly increasing.
+
+        Raises
+        ------
+        InputError
+            If a matrix is not finite.
+        """
+        square = (self.order, self.order)
+        made = object.__new__(DelaySystem)
+        made.__dict__.update({field: self.__dict__[field] for field in _FIELDS})
+        made.__dict__.update(
+            A0=_matrix("A0", A0, square),
+            delayed=tuple(_matrix("delayed", matrix, square) for matrix in delayed),
+            delays=delays,
+        )
+        return made
+
     @functools.cached_property
     def factors(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
         """Minimal factors (L, R) of each Ai = L R: R X are the signals that are delayed.
@@ -207,6 +235,9 @@ class DelaySystem:
 
     def _size(self) -> FloatArray:
         return np.asarray(sum((np.abs(matrix) for matrix in self.delayed), np.abs(self.A0)))
+
+
+_FIELDS = tuple(field.name for field in fields(DelaySystem))
 
 
 def low_rank_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -156,19 +156,23 @@ def tried(
     free_growth: float,
     surroundings: Mapping[str, Any],
     executor: Executor | None,
+    uncontrolled: dict[str, Figures],
 ) -> list[Candidate]:
     """Return the candidates after trial runs, the one to take first.
 
     A candidate counts as what its worst start leads to; among those alike as what the one with
     about twice its gains leads to, so that it stands that; among those the one of fastest decay
     is taken. The first has been tried from more starts, and at the other points of the objective
-    it does no harm either.
+    it does no harm either. ``uncontrolled`` takes what becomes of the case's starts without
+    control, and is asked before they are run again.
     """
 
     def judged(
         there: Case, some: Sequence[Candidate], starts: Sequence[Start]
     ) -> list[tuple[Trial, ...]]:
-        free = dict(sorted(spread_out(executor, _free, [(there, start) for start in starts])))
+        free = uncontrolled if there is case else {}
+        new = [(there, start) for start in starts if start.name not in free]
+        free.update(spread_out(executor, _free, new))
         tasks = [
             (i, there, structure.gains(each.solution.gains), structure, free, surroundings, start)
             for i, each in enumerate(some)

@@ -22,6 +22,7 @@ from drillctrl.designs.swings import Swing, largest_growth, measured_swings
 from drillctrl.drilling.case import Case
 from drillctrl.motion.loop import torsional_system
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.outcome import Figures
 from drillctrl.synthesis.objectives import Requirements
 
 # States of a plant whose motion is measured without being asked.
@@ -114,13 +115,15 @@ def motion_design(
         without = largest_growth(swings)
         found = candidates(case, objective, swings, structure, requirements, seed, SHARES)
         if trials:
-            found = tried(case, objective, structure, found, without, surroundings, executor)
+            runs: dict[str, Figures] = {}
+            given = surroundings, executor, runs
+            found = tried(case, objective, structure, found, without, *given)
             if irregular(found):
                 more = candidates(
                     case, objective, swings, structure, requirements, seed, between(found, SHARES)
                 )
                 found = sorted([*found, *more], key=lambda each: -each.share)
-                found = tried(case, objective, structure, found, without, surroundings, executor)
+                found = tried(case, objective, structure, found, without, *given)
     best: Candidate = found[0]
     gains = best.solution.gains
     known = analysis_fields(assess(case, structure, *structure.gains(gains)))

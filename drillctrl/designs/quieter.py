@@ -19,7 +19,7 @@ _BLADES = (1, 2, 3, 4)
 
 @dataclass(frozen=True)
 class Quieter:
-    """A change with which the motion is quiet from every start, without control.
+    """A change with which the motion is quiet from each of `STARTS`, without control.
 
     Attributes
     ----------
@@ -46,8 +46,8 @@ class Quieter:
 def quieter(case: Case) -> tuple[Quieter, ...]:
     """Return the smallest changes tried with which the motion is quiet without control.
 
-    Steps are of a tenth of speed or feed, and of one blade; each has been run from every start
-    of the trials. That a kind is missing means that nothing up to twice the speed, a tenth of
+    Steps are of a tenth of speed or feed, and of one blade; each has been run from the three
+    `STARTS`. That a kind is missing means that nothing up to twice the speed, a tenth of
     the feed or four more blades did.
 
     Raises

@@ -264,7 +264,7 @@ def _quieter_lines(design: Design, found: tuple[Quieter, ...]) -> Lines:
     words = []
     for change in found:
         text = _change_text(design, change)
-        words.append(f"{text}: swing {change.swing:.2g} at most, from every start")
+        words.append(f"{text}: swing {change.swing:.2g} at most, small start and kicks")
     if not words:
         words = ["nothing up to twice the speed, a tenth of the feed or four more blades"]
     return list(zip(["Quiet without", *[""] * (len(words) - 1)], words, strict=True))

@@ -32,6 +32,7 @@ _STEPS = 400_000
 
 
 _UNDER_WAY = "control that is switched on in the midst of what follows a kick"
+USUAL_STARTS = "a small disturbance and from kicks forward and back by half the speed"
 STARTS = tuple(start_named(name) for name in ("small", "kick", "back"))
 # A bit that starts from rest or from stick says less of gains than of the rig: many a string
 # turns back out of a stick without any. What they do then says when to switch them on.
@@ -123,7 +124,7 @@ def standing_starts(case: Case) -> tuple[Start, ...]:
 
 
 def uncontrolled_runs(where: Where) -> dict[str, Figures]:
-    """Return what becomes of every start without control, by its name."""
+    """Return what becomes of each start without control, by its name."""
     case = as_case(where)
     starts = (*STARTS, *standing_starts(case))
     return {start.name: trial_run(case, None, start) for start in starts}
@@ -137,7 +138,7 @@ def trial_runs(
     spare: bool = False,
     starts: Sequence[Start] = STARTS,
 ) -> tuple[Trial, ...]:
-    """Try a controller from every start, beside the same runs without it.
+    """Try a controller from each start, beside the same runs without it.
 
     Parameters
     ----------

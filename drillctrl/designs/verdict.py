@@ -11,7 +11,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.designs.trials import Trial, standing_starts, trial_runs
+from drillctrl.designs.trials import STARTS, USUAL_STARTS, Trial, standing_starts, trial_runs
 from drillctrl.drilling.case import Case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import Figures
@@ -139,12 +139,22 @@ def judge(
         what = "they do not settle it" if stable else "they do not stabilise smooth drilling"
         return Verdict(False, f"{what}, and do no measurable good: {_beside(runs[0])}", runs)
     if len(settled) == len(runs):
-        return Verdict(True, "with these gains the motion settles from every start", runs)
+        return Verdict(True, f"with these gains the motion settles from {starts_text(runs)}", runs)
     if not settled:
         return Verdict(True, f"smooth drilling is not reached, but {good}{_but(runs)}", runs)
     rest = next(trial for trial in runs if trial not in settled)
-    small = f"the motion settles from {settled[0].start.text}, but not from every start"
-    return Verdict(True, f"{small}: {_beside(rest)}", runs)
+    small = f"the motion settles from {starts_text(settled)}"
+    return Verdict(True, f"{small}, but {_beside(rest)}", runs)
+
+
+def starts_text(runs: Sequence[Trial]) -> str:
+    """Name the starts of runs, those of every trial in short."""
+    names = [run.start.name for run in runs]
+    texts = list(dict.fromkeys(run.start.text for run in runs))
+    if {start.name for start in STARTS} <= set(names):
+        usual = {start.text for start in STARTS}
+        texts = [USUAL_STARTS, *(text for text in texts if text not in usual)]
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def with_engagement(

@@ -75,9 +75,10 @@ class Case:
         if (told := self.told_point) is not None:
             speed = self.language.text("angular_rate", told.rotary_speed)
             rate = self.language.text("axial_rate", told.penetration_rate)
-            return (
-                f"{speed}, {rate}, rock of {self.language.text('stress', told.rig.rock_strength)}"
-            )
+            rock = f"rock of {self.language.text('stress', told.rig.rock_strength)}"
+            depth = told.rig.depth
+            string = [] if depth is None else [f"{self.language.text('depth', depth)} of string"]
+            return ", ".join([speed, rate, rock, *string])
         p = self.point
         return "" if p is None else f"ω0 = {p.omega0:g}, δ0 = {p.delta0:g}, ψ = {p.psi:g}"
 

@@ -40,5 +40,5 @@ class Stribeck(BitRock):
         falling = q.drop * ca.exp(-ca.fabs(rates.rotary) / q.decay)
         return Load(
             plain.weight_on_bit,
-            plain.torque_on_bit + falling * contact.direction * contact.pressed,
+            plain.torque_on_bit + falling * contact.pressed * contact.direction,
         )

@@ -189,7 +189,11 @@ def rest_state(arrays: MotionArrays) -> FloatArray:
         If nothing holds the string at its top, as with a drive that is free to turn.
     """
     c = Coefficients(*arrays.q[: len(Coefficients._fields)])
-    follows = arrays.R[: arrays.A.shape[0]]
+    follows = np.zeros((len(arrays.A), 4))
+    for row, led in zip(arrays.C, arrays.R, strict=True):
+        # A state that is an output as it is; those of a drive's law are none.
+        if np.count_nonzero(row) == 1 and row.max() == 1.0:
+            follows[row.argmax()] = led
     places = (follows[:, 0] + follows[:, 2]) != 0.0
     moving = (follows[:, 1] + follows[:, 3]) != 0.0
     state = -follows[:, 1] * c.penetration_rate - follows[:, 3] * c.rotary_speed

@@ -84,7 +84,7 @@ class Plant:
         """All parameters: the groups, then those of the parts."""
         return (*self.group_names, *(name for part in self.parts for name in part.values))
 
-    @property
+    @functools.cached_property
     def form(self) -> Hashable:
         """What the plant is apart from the values of its parts."""
         return (tuple(part.form for part in self.parts), self.group_names, self.coefficients)
@@ -264,6 +264,8 @@ def paper_plant(
     InputError
         If a part is of another kind.
     """
+    if bit is None and string is None and not blocks:
+        return _paper()
     law = PaperLaw() if bit is None else bit
     if string is None:
         string = LumpedString()
@@ -279,6 +281,12 @@ def paper_plant(
             raise InputError(name, type(part).__name__, f"a {kind.__name__}")
     groups = tuple(name for name in GROUP_NAMES if name not in string.unused_groups)
     return Plant(law, string, blocks, groups)
+
+
+@functools.cache
+def _paper() -> Plant:
+    """Return the paper's plant, which most calls are about: what is derived of it is kept."""
+    return Plant(PaperLaw(), LumpedString(), ())
 
 
 def rig_plant() -> Plant:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+import scipy.sparse
 
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.coefficients import Expression
@@ -164,14 +165,26 @@ def weighted(made: Realisation, name: str, weights: object) -> tuple[ca.SX, ca.S
 
 
 def _inverse(mass: ca.SX) -> ca.SX:
-    """Return the inverse of a mass matrix; entry by entry where it is diagonal.
+    """Return the inverse of a mass matrix, each part that is joined to no other by itself.
 
-    Else coordinates whose rows are numbers are eliminated in numbers, and only what is left
-    of the others is inverted in symbols.
+    What moves along the string thus has no place where it turns, not even one that is zero.
+    """
+    joined = scipy.sparse.csr_array(np.array(ca.DM(mass.sparsity(), 1)))
+    count, parts = scipy.sparse.csgraph.connected_components(joined, directed=False)
+    inverse = ca.SX(*mass.shape)
+    for part in range(count):
+        places = np.flatnonzero(parts == part).tolist()
+        inverse[places, places] = _inverse_of_part(mass[places, places])
+    return inverse
+
+
+def _inverse_of_part(mass: ca.SX) -> ca.SX:
+    """Return the inverse of a mass matrix.
+
+    Coordinates whose rows are numbers are eliminated in numbers, and only what is left of
+    the others is inverted in symbols.
     """
     size = mass.shape[0]
-    if mass.sparsity().is_diag() and mass.nnz() == size:
-        return ca.diag(1 / ca.diag(mass))
     plain = [i for i in range(size) if mass[i, :].is_constant() and mass[:, i].is_constant()]
     other = [i for i in range(size) if i not in plain]
     if not plain:

@@ -121,6 +121,11 @@ class Rig:
         """
         return {}
 
+    @property
+    def depth(self) -> float | None:
+        """Length of the string, m; None where that is lumped."""
+        return None
+
     def with_rock_strength(self, rock_strength: float) -> Rig:
         """Return the same rig in another rock (Pa)."""
         return dataclasses.replace(self, rock_strength=rock_strength)

@@ -11,7 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.floquet import check_continuous, floquet
+from drillctrl.simulation.floquet import check_repeats, floquet
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.status import Status
 
@@ -34,7 +34,7 @@ def orbit_exponents(
     where : OperatingPoint, RigPoint or Case
         What drills, and where.
     controller : Controller, optional
-        Closes the loop; neither sampled nor noisy nor scheduled.
+        Closes the loop; without noise and with fixed gains.
     **options
         Of `simulate`.
 
@@ -48,9 +48,9 @@ def orbit_exponents(
     Raises
     ------
     InputError
-        If there is no plant, or the controller is sampled, noisy or scheduled.
+        If there is no plant, or the controller is one that `floquet` refuses.
     """
-    check_continuous(controller)
+    check_repeats(controller)
     case = as_case(where)
     _, point = case.physics("an orbit")
     duration = min(_REACHED / max(point.kappa, 1e-9), _LONGEST)

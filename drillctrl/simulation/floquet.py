@@ -34,13 +34,14 @@ class Floquet:
     period : float
         Of the motion.
     multipliers : complex array, (m,)
-        By falling modulus. One of them is 1: a shift along the motion. Those that drown in the
+        By falling modulus. One of them is 1, a shift along an orbit. Those that drown in the
         error of the integrations (below 1e-5 for the usual size) are left out.
     residuals : array, (m,)
         For each: how far the image of its direction is from the multiple of it, relative to
         the size of the direction.
-    trivial_error : float
+    trivial_error : float or None
         Distance from 1 of the multiplier that ought to be 1: the accuracy of the large ones.
+        None where the motion rests under a sampled controller, and none of them is 1.
     section : float
         Instant of the run at which perturbations are compared with what they are a period later.
     """
@@ -48,13 +49,15 @@ class Floquet:
     period: float
     multipliers: ComplexArray
     residuals: FloatArray
-    trivial_error: float
+    trivial_error: float | None
     section: float
 
     @property
     def largest(self) -> float | None:
-        """Modulus of the largest multiplier beside the 1; None if only the 1 was found."""
-        others = np.delete(self.multipliers, int(abs(self.multipliers - 1.0).argmin()))
+        """Modulus of the largest multiplier beside the 1; None if no other was found."""
+        others = self.multipliers
+        if self.trivial_error is not None:
+            others = np.delete(others, int(abs(others - 1.0).argmin()))
         return float(abs(others).max()) if others.size else None
 
 
@@ -65,7 +68,8 @@ def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: 
     Parameters
     ----------
     run : Simulation
-        It has come to the orbit; not of a sampled, noisy or scheduled controller.
+        It has come to the orbit, or rests under a sampled controller; without noise and with
+        fixed gains.
     directions : int
         Of the Krylov space; two integrations over a period for each.
     size : float
@@ -81,7 +85,8 @@ def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: 
     Raises
     ------
     InputError
-        If the run does not end in a periodic motion.
+        If the run does not end in a periodic motion, or its controller is noisy, scheduled, or
+        sampled with the present delay.
 
     Notes
     -----
@@ -90,21 +95,33 @@ def floquet(run: Simulation, *, directions: int = 12, size: float = 1e-5, seed: 
     from perturbed pasts, at the same nodes one period later; stick, release and loss of
     contact shift with the perturbation and need no matching conditions. Arnoldi's method gives
     the multipliers of that map.
+
+    Under a sampled controller perturbations begin where a sample is taken. A motion at rest has
+    multipliers over any number of samples, none of which is 1; the least number that fills a
+    delay is taken. A period of an orbit that is no whole number of samples ends between two of
+    them: the motion repeats as far as it does not depend on where in its period samples fall,
+    and ``trivial_error`` says how far that is.
     """
     checked_integer("directions", directions, 2, 200)
     checked_number("size", size, 1e-7, 1e-2)
-    check_continuous(run.controller)
+    check_repeats(run.controller)
     if run.scenario.changes and run.scenario.changes[-1].time > 0.5 * run.times[-1]:
         raise InputError("run", "changed on the way", "one that has come to an orbit since")
-    orbit = limit_cycle(run, since=0.5 * float(run.times[-1]))
-    if orbit is None:
-        raise InputError("run", _length(run), "longer, or of a motion that repeats")
-    section = _quiet_instant(run, orbit.period)
+    sampling = _sampling(run)
+    rests = sampling is not None and run.summary.settled
+    if sampling is not None and rests:
+        period = float(np.ceil(run.structure.delay / sampling)) * sampling
+    else:
+        orbit = limit_cycle(run, since=0.5 * float(run.times[-1]))
+        if orbit is None:
+            raise InputError("run", _length(run), "longer, or of a motion that repeats")
+        period = orbit.period
+    section = _quiet_instant(run, period)
     found, residuals = multipliers_at(
-        run, section, orbit.period, directions=directions, size=size, seed=seed
+        run, section, period, directions=directions, size=size, seed=seed
     )
-    apart = float(abs(found - 1.0).min())
-    return Floquet(orbit.period, found, residuals, apart, section)
+    apart = None if rests else float(abs(found - 1.0).min())
+    return Floquet(period, found, residuals, apart, section)
 
 
 def multipliers_at(
@@ -166,20 +183,24 @@ def multipliers_at(
     return _arnoldi(image, first, directions, _ERROR * _RTOL / size)
 
 
-def check_continuous(controller: Controller | None) -> None:
+def check_repeats(controller: Controller | None) -> None:
     """Refuse a controller under which no motion repeats.
 
     Raises
     ------
     InputError
-        If it is sampled, noisy or scheduled.
+        If it is noisy or scheduled, or sampled with the present delay.
     """
     if controller is None:
         return
-    if controller.period is not None or controller.schedule or controller.noise:
-        raise InputError(
-            "controller", "sampled, noisy or scheduled", "continuous, with fixed gains"
-        )
+    if controller.schedule or controller.noise:
+        raise InputError("controller", "noisy or scheduled", "without noise, with fixed gains")
+    if controller.period is not None and controller.delay == "current":
+        raise InputError("delay", controller.delay, "fixed where the controller is sampled")
+
+
+def _sampling(run: Simulation) -> float | None:
+    return None if run.controller is None else run.controller.period
 
 
 def _length(run: Simulation) -> str:
@@ -187,13 +208,21 @@ def _length(run: Simulation) -> str:
 
 
 def _quiet_instant(run: Simulation, period: float) -> float:
-    """Return the middle of the longest stretch without events in the last period but one."""
+    """Return the middle of the longest stretch without events in the last period but one.
+
+    Under a sampled controller it is the last sample before.
+    """
     end = float(run.times[-1])
     inside = [e.time for e in run.events if end - 2.0 * period <= e.time <= end]
     edges = np.array([end - 2.0 * period, *inside, end])
     middles = 0.5 * (edges[1:] + edges[:-1])
+    sampling = _sampling(run)
+    if sampling is not None:
+        assert run.controller is not None
+        begin = run.controller.activation
+        middles = begin + np.floor((middles - begin) / sampling) * sampling
     motion = run.at(middles)
-    free = motion.contact & ~motion.stuck & ~motion.held
+    free = motion.contact & ~motion.stuck & ~motion.held & (middles > edges[:-1])
     if run.controller is not None:
         saturated = run.phases("saturated")
         free &= np.array([not any(a <= t <= b for a, b in saturated) for t in middles])

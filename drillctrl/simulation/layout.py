@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -332,13 +333,21 @@ def _stand_still(standing: March, structure: Structure, settings: data.Settings)
     return standing._replace(first=2)
 
 
-def _look_back(standing: March, structure: Structure, settings: data.Settings, steps: int) -> None:
-    """Set the steps before t = 0 at which constant delays look."""
+def _look_back(
+    standing: March,
+    structure: Structure,
+    settings: data.Settings,
+    steps: int,
+    known: float = math.inf,
+) -> None:
+    """Set the steps before t = 0, known for so long, at which constant delays look."""
     march, model, interpolate = (
         kernel(name, structure.physics) for name in ("march", "model", "interpolate")
     )
     for i in range(3):
         lag = model.lag_of(settings, i, 0)
+        if lag > known:
+            raise InputError("start", f"a past of {known:g}", f"one that is known for {lag:g}")
         if lag > 0.0:
             standing.ints[march.LAG0 + i] = interpolate.step_at(standing.history, steps, -lag)
 
@@ -359,7 +368,7 @@ def _resume(past: Past, structure: Structure, settings: data.Settings, room: int
     ints[march.I_TORSION], ints[march.I_AXIAL] = last[data.TORSION], last[data.AXIAL]
     # Another controller takes over: its torque need not continue the one before.
     ints[march.I_LEVEL] = 2
-    _look_back(standing, structure, settings, steps)
+    _look_back(standing, structure, settings, steps, past.known)
     if past.model == "nonlinear":
         chain[:] = last[[data.LAG, data.FACE]]
         passes = ints[march.I_PASSES] = int(last[data.PASSES])

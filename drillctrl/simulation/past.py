@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,10 @@ from drillctrl.simulation.structure import Structure
 
 if TYPE_CHECKING:
     from drillctrl.simulation.trace import Trace
+
+
+# Steps more than the faces need, so that a search for them begins before.
+_SPARE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,8 @@ class Past:
         States and inputs at the instant.
     real, whole : array
         Steps of the integrator up to the instant, as in its history; times end at 0.
+    known : float
+        So much time before it is known; infinite where all is.
     """
 
     point: OperatingPoint
@@ -46,13 +53,19 @@ class Past:
     state: FloatArray
     real: FloatArray
     whole: npt.NDArray[np.int64]
+    known: float = math.inf
 
     def __repr__(self) -> str:
         begun = float(self.real[1, 0]) if len(self.real) > 1 else 0.0
         return f"<Past: {-begun:g} units of time, {len(self.real) - 1} steps>"
 
 
-def past_of(run: Trace, time: float | None = None, changed: float | None = None) -> Past:
+def past_of(
+    run: Trace,
+    time: float | None = None,
+    changed: float | None = None,
+    kept: float | None = None,
+) -> Past:
     """Return what a run has left behind.
 
     Parameters
@@ -63,6 +76,8 @@ def past_of(run: Trace, time: float | None = None, changed: float | None = None)
         The instant; by default the end of the run.
     changed : float, optional
         When the drive or the rock was first changed, which must not be before the instant.
+    kept : float, optional
+        So much time is kept, and besides it what the faces in the rock need; by default all.
 
     Raises
     ------
@@ -81,12 +96,32 @@ def past_of(run: Trace, time: float | None = None, changed: float | None = None)
     last = int(np.searchsorted(start, when, side="left"))
     first = run.first
     last = max(last, first)
-    real, whole = history.real[:last].copy(), history.whole[:last].copy()
+    dropped = 0 if kept is None else _not_needed(history, last, when - kept)
+    real, whole = history.real[dropped:last].copy(), history.whole[dropped:last].copy()
+    places = whole[:, [data.LAG, data.FACE]] - dropped
+    whole[:, [data.LAG, data.FACE]] = np.maximum(places, 0)
     if last > first:
         begun, length = real[-1][[data.START, data.LENGTH]]
         restrict(real[-1], 0.0, (when - begun) / length, len(names))
     real[:, data.START] -= when
-    return Past(run.point, run.structure, run.model, state, real, whole)
+    known = -float(real[0, data.START]) if dropped else math.inf
+    return Past(run.point, run.structure, run.model, state, real, whole, known)
+
+
+def _not_needed(history: data.History, last: int, since: float) -> int:
+    """Return how many of the first steps nothing looks at from the end of step ``last`` − 1 on.
+
+    A blade meets what was left one pitch before or since, and what a bit off the rock had
+    under itself then.
+    """
+    whole = history.whole
+    pitch = slice(int(whole[last - 1, data.LAG]), last)
+    faces = whole[pitch, data.FACE][whole[pitch, data.PASSES] > 1]
+    first = min(int(whole[pitch, data.LAG].min()), int(faces.min(initial=last)))
+    first = min(first, int(np.searchsorted(history.real[:last, data.START], since)))
+    while first > 0 and whole[first - 1, data.BEHIND]:
+        first -= 1
+    return max(first - _SPARE, 0)
 
 
 def restrict(row: FloatArray, low: float, high: float, signals: int) -> None:

@@ -205,7 +205,9 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     ]  # fmt: skip
     if multipliers is not None:
         values = ", ".join(_complex(value) for value in multipliers.multipliers[:5])
-        lines.append(("Multipliers", f"{values} (1 found within {multipliers.trivial_error:.0e})"))
+        error = multipliers.trivial_error
+        found = f"over {multipliers.period:.4g}" if error is None else f"1 found within {error:.0e}"
+        lines.append(("Multipliers", f"{values} ({found})"))
     lines += [
         ("Bit speed", speed),
         ("Axial", _length_text(run, lowest, highest)),

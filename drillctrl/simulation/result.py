@@ -88,13 +88,16 @@ class Simulation(Trace):
         """Return the rock ahead of a blade at an instant; see `simulation.rock_face`."""
         return rock_face(self, time, count)
 
-    def past(self, time: float | None = None) -> Past:
+    def past(self, time: float | None = None, *, kept: float | None = None) -> Past:
         """Return what the run has left behind at an instant, to start another one from.
 
         Parameters
         ----------
         time : float, optional
             By default the end of the run.
+        kept : float, optional
+            So much time before it is kept, and what the faces in the rock need, so that a
+            chain of runs takes no more and more memory; by default all.
 
         Raises
         ------
@@ -102,7 +105,7 @@ class Simulation(Trace):
             If the instant is outside the run, or the rig was changed before it.
         """
         changes = self.scenario.changes
-        return past_of(self, time, changes[0].time if changes else None)
+        return past_of(self, time, changes[0].time if changes else None, kept)
 
     @functools.cached_property
     def summary(self) -> Summary:

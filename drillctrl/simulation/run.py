@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
@@ -12,7 +13,7 @@ from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.advance import finished, go_on
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import FIRST_ROOM, begin, check_start, settings_for
+from drillctrl.simulation.layout import FIRST_ROOM, March, begin, check_start, settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.structure import Structure, structure_of
@@ -101,6 +102,81 @@ def checked_run(
     return scenario, duration, rtol, atol, max_steps
 
 
+class Prepared(NamedTuple):
+    """A run before its first step.
+
+    Attributes
+    ----------
+    standing : March
+        At t = 0.
+    structure : Structure
+        What moves.
+    steps : (float, int)
+        Longest step, and most steps.
+    asked : dict
+        Fields of `Simulation` that say what was asked for.
+    """
+
+    standing: March
+    structure: Structure
+    steps: tuple[float, int]
+    asked: dict[str, Any]
+
+
+def prepare(
+    where: Where,
+    controller: Controller | None = None,
+    scenario: Scenario | None = None,
+    *,
+    model: str = "nonlinear",
+    cutting: str = "multiple",
+    backwards: str = "rest",
+    max_step: float = math.inf,
+    **options: Any,
+) -> Prepared:
+    """Return a run that is checked and laid out; arguments are those of `checked_run`."""
+    case = as_case(where)
+    _, point = case.physics("a simulation")
+    structure = structure_of(case)
+    scenario, duration, rtol, atol, max_steps = checked_run(
+        case,
+        scenario,
+        structure=structure,
+        controller=controller,
+        model=model,
+        cutting=cutting,
+        backwards=backwards,
+        max_step=max_step,
+        **options,
+    )
+    settings = settings_for(
+        structure,
+        controller,
+        scenario.drive(point),
+        duration=duration,
+        linear=model == "linear",
+        multiple=cutting == "multiple",
+        backwards=backwards == "rest",
+        rtol=rtol,
+        atol=atol,
+    )
+    room = min(FIRST_ROOM, max_steps + 1)
+    standing = begin(point, structure, controller, settings, scenario, room)
+    asked = {
+        "case": case,
+        "structure": structure,
+        "controller": controller,
+        "scenario": scenario,
+        "model": model,
+        "cutting": cutting,
+        "backwards": backwards,
+        "duration": duration,
+        "rtol": rtol,
+        "atol": atol,
+    }
+    return Prepared(standing, structure, (float(max_step), max_steps), asked)
+
+
 @checks_kinds
 def simulate(
     where: Where,
@@ -182,7 +258,7 @@ def simulate(
     if time_limit != math.inf:
         checked_number("time_limit", time_limit, 0.0, open_low=True)
     case = as_case(where)
-    plant, point = case.physics("a simulation")
+    plant, _ = case.physics("a simulation")
     if controller is not None and not isinstance(controller, Controller):
         kind = type(controller).__name__
         raise InputError("controller", kind, "a Controller, such as Controller(structure, K1, K2)")
@@ -190,12 +266,10 @@ def simulate(
     if meant is not None and meant != plant and not other_plant:
         wanted = f"the one that the gains were designed for, {meant.text}, or other_plant=True"
         raise InputError("plant", plant.text, wanted)
-    structure = structure_of(case)
-    scenario, duration, rtol, atol, max_steps = checked_run(
+    prepared = prepare(
         case,
+        controller,
         scenario,
-        structure=structure,
-        controller=controller,
         duration=duration,
         initial=initial,
         model=model,
@@ -206,47 +280,17 @@ def simulate(
         max_step=max_step,
         max_steps=max_steps,
     )
-    linear = model == "linear"
-    settings = settings_for(
-        structure,
-        controller,
-        scenario.drive(point),
-        duration=duration,
-        linear=linear,
-        multiple=cutting == "multiple",
-        backwards=backwards == "rest",
-        rtol=rtol,
-        atol=atol,
-    )
-    standing = begin(
-        point, structure, controller, settings, scenario, min(FIRST_ROOM, max_steps + 1)
-    )
     started = time.perf_counter()
     standing, outcome = go_on(
-        standing,
-        structure,
-        duration,
-        float(max_step),
-        max_steps,
+        prepared.standing,
+        prepared.structure,
+        prepared.asked["duration"],
+        *prepared.steps,
         started + time_limit,
         progress,
     )
     elapsed = time.perf_counter() - started
-    run = finished(
-        standing,
-        outcome,
-        case=case,
-        structure=structure,
-        controller=controller,
-        scenario=scenario,
-        model=model,
-        cutting=cutting,
-        backwards=backwards,
-        duration=duration,
-        rtol=rtol,
-        atol=atol,
-        elapsed_seconds=elapsed,
-    )
+    run = finished(standing, outcome, elapsed_seconds=elapsed, **prepared.asked)
     if outcome == data.INTERRUPTED:
         raise Interrupted(run)
     return run

@@ -41,7 +41,8 @@ class Slowing:
     speeds : array, (k,)
         rad/s, those that were reached, in their order.
     swings : array, (k,)
-        Stick-slip index of the bit over the second half of each step.
+        Stick-slip index of the bit over the second half of each step; infinite where it stands
+        still throughout.
     linear : float
         rad/s, below which steady turning is unstable: where the torque falls by the smallest
         critical slope of the first 16 modes of torsion; infinite if the drive is by itself.
@@ -66,7 +67,7 @@ class Slowing:
         return {
             "structure": self.control.name,
             "speeds": self.speeds.tolist(),
-            "swings": self.swings.tolist(),
+            "swings": [swing if math.isfinite(swing) else None for swing in self.swings.tolist()],
             "stick_slip_speed": self.stick_slip,
             "linear_speed": self.linear if math.isfinite(self.linear) else None,
             "status": self.status,
@@ -117,9 +118,9 @@ def slow_down(
     if not isinstance(rig, StringRig):
         raise InputError("rig", type(rig).__name__, "one with a string and a top drive")
     time, torque = rig.time_scale, rig.torsional_stiffness
-    bit: BitRock = Stribeck(drop=law.drop / torque, decay=law.decay * time)
+    friction: BitRock = Stribeck(drop=law.drop / torque, decay=law.decay * time)
     begun = replace(where, rotary_speed=float(given[0]))
-    case, controller = law_controller(begun, control, bit, period=period)
+    case, controller = law_controller(begun, control, friction, period=period)
     changes = tuple(
         Change(hold * (i + 1) / time, _RAMP / time, omega0=speed * time)
         for i, speed in enumerate(given[1:].tolist())
@@ -139,8 +140,9 @@ def slow_down(
         start, stop = hold * (i + _SETTLED) / time, hold * (i + 1) / time
         if stop > run.times[-1] * (1.0 + 1e-9):
             break
-        turned = run.at(np.linspace(start, min(stop, run.times[-1]), _SAMPLES), ("dtheta",)).dtheta
-        swings.append(float(np.ptp(turned)) / (2.0 * speed * time))
+        bit = run.at(np.linspace(start, min(stop, run.times[-1]), _SAMPLES), ("dtheta",))
+        swing = float(np.ptp(bit.dtheta)) / (2.0 * speed * time)
+        swings.append(math.inf if bit.stuck.all() else swing)
     line = rig.string.torsion
     slope = min(mode.slope for mode in mode_slopes(line, control, _MODES))
     stable = drive_is_stable(line, control)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,16 +13,13 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.case import Where, as_case
+from drillctrl.drilling.case import Where
 from drillctrl.simulation.advance import finished, go_on
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import FIRST_ROOM, begin, settings_for
 from drillctrl.simulation.result import Simulation
-from drillctrl.simulation.run import checked_run
-from drillctrl.simulation.scenario import Scenario
-from drillctrl.simulation.structure import structure_of
+from drillctrl.simulation.run import prepare
 
 
 class SteppedRun:
@@ -43,10 +40,13 @@ class SteppedRun:
         When the run ends.
     limit, rate_limit, measurement_delay, actuator_lag
         As of `Controller`.
-    scenario : Scenario, optional
-        Start, perturbation and changes on the way.
-    initial, cutting, backwards, rtol, atol, max_step, max_steps
+    encoder : float, optional
+        Angle of a count of the encoder at the top drive: the outputs ``phi`` and ``dphi`` are what
+        it counts, and that over a period.
+    max_steps : int
         As of `simulate`.
+    **options
+        Of `simulate`: scenario, initial, cutting, backwards, rtol, atol, max_step.
 
     Attributes
     ----------
@@ -71,54 +71,23 @@ class SteppedRun:
         rate_limit: float | None = None,
         measurement_delay: float = 0.0,
         actuator_lag: float = 0.0,
-        scenario: Scenario | None = None,
-        initial: Mapping[str, float] | None = None,
-        cutting: str = "multiple",
-        backwards: str = "rest",
-        rtol: float = 1e-8,
-        atol: float | None = None,
-        max_step: float = math.inf,
+        encoder: float | None = None,
         max_steps: int = 100_000_000,
+        **options: Any,
     ) -> None:
-        case = as_case(where)
-        _, point = case.physics("a simulation")
-        structure = structure_of(case)
         self._controller = outside_controller(
             outputs, inputs, period, limit, rate_limit, measurement_delay, actuator_lag
         )
-        scenario, duration, rtol, atol, max_steps = checked_run(
-            case,
-            scenario,
-            structure=structure,
-            controller=self._controller,
-            duration=duration,
-            initial=initial,
-            cutting=cutting,
-            backwards=backwards,
-            rtol=rtol,
-            atol=atol,
-            max_step=max_step,
-            max_steps=max_steps,
+        prepared = prepare(
+            where, self._controller, duration=duration, max_steps=max_steps, **options
         )
-        settings = settings_for(
-            structure,
-            self._controller,
-            scenario.drive(point),
-            duration=duration,
-            linear=False,
-            multiple=cutting == "multiple",
-            backwards=backwards == "rest",
-            rtol=rtol,
-            atol=atol,
-        )
+        self._standing, self._structure, self._steps, self._asked = prepared
+        structure = self._structure
         self._march = kernel("march", structure.physics)
         self._evaluate = kernel("sample", structure.physics).evaluate
-        room = min(FIRST_ROOM, max_steps + 1)
-        self._standing = begin(point, structure, self._controller, settings, scenario, room)
         # Samples are taken here, not by the march.
         self._standing.reals[self._march.NEXT_SAMPLE] = math.inf
         self.sample, self._outcome, self._elapsed = 0, data.DONE, 0.0
-        self._structure, self._steps = structure, (float(max_step), max_steps)
         self._limits = (
             math.inf if limit is None else limit,
             math.inf if rate_limit is None or actuator_lag else rate_limit * period,
@@ -130,19 +99,13 @@ class SteppedRun:
         self._wanted = np.array(
             [rows + structure.output_names.index(name) for name in outputs], dtype=np.int64
         )
+        self._measured, self._count = tuple(outputs), 0.0
+        if encoder is not None:
+            self._count = checked_number("encoder", encoder, 0.0, math.tau, open_low=True)
+            if "phi" not in structure.state_names:
+                raise InputError("encoder", encoder, "left out where there is no top drive")
+            self._top = np.array([names.index("phi"), names.index("dphi")], dtype=np.int64)
         self._driven = [structure.input_names.index(name) for name in inputs]
-        self._asked: dict[str, Any] = {
-            "case": case,
-            "structure": structure,
-            "controller": self._controller,
-            "scenario": scenario,
-            "model": "nonlinear",
-            "cutting": cutting,
-            "backwards": backwards,
-            "duration": duration,
-            "rtol": rtol,
-            "atol": atol,
-        }
         # Compiles what is not compiled yet, before any clock runs.
         self._go_on(0.0)
         self.outputs()
@@ -159,9 +122,28 @@ class SteppedRun:
 
     def outputs(self) -> FloatArray:
         """Return what is measured now (a measurement delay ago), (p,)."""
+        when = self.time - self._controller.measurement_delay
+        found = self._at(when, self._wanted)
+        return found + self._miscounted(when) if self._count else found
+
+    def _miscounted(self, when: float) -> FloatArray:
+        """Return what an encoder tells beyond the outputs as they are, (p,)."""
+        period, speed = self._controller.period, self._structure.omega0
+        assert period is not None
+        angle, rate = self._at(when, self._top)
+        before = self._at(when - period, self._top)[0]
+        turned = np.array([speed * when + angle, speed * (when - period) + before])
+        counted = np.floor(turned / self._count) * self._count
+        told = {
+            "phi": counted[0] - turned[0],
+            "dphi": (counted[0] - counted[1]) / period - speed - rate,
+        }
+        return np.array([told.get(name, 0.0) for name in self._measured])
+
+    def _at(self, when: float, wanted: npt.NDArray[np.int64]) -> FloatArray:
+        """Return some columns of a sample at an instant that has passed."""
         standing = self._standing
         used = int(standing.ints[self._march.STEPS])
-        when = self.time - self._controller.measurement_delay
         start = standing.history.real[:used, data.START]
         place = max(int(np.searchsorted(start, when, side="right")) - 1, 0)
         found: FloatArray = self._evaluate(
@@ -170,7 +152,7 @@ class SteppedRun:
             used,
             np.array([place], dtype=np.int64),
             np.array([when]),
-            self._wanted,
+            wanted,
         )
         return found[:, 0]
 

@@ -66,7 +66,10 @@ def _reach(run: Simulation, section: float) -> float:
     """Return the earliest instant that the motion after the section depends on."""
     settings, history = run.settings, run.history
     lags = settings.real[data.LAGS : data.LAGS + 2]
-    lag = float(max(*lags, settings.schedule[:, data.PAST_AGE].max()))
+    age = settings.schedule[:, data.PAST_AGE].max()
+    if settings.whole[data.SAMPLED]:
+        age += settings.real[data.MEASURE_DELAY]
+    lag = float(max(*lags, age))
     earliest = section - lag
     if run.model == "linear":
         return earliest

@@ -125,8 +125,11 @@ def tight_bound(system: DelaySystem, right_of: float) -> float:
 
 def perron_root(matrix: FloatArray) -> float:
     """Return the spectral radius of a nonnegative matrix, rounded outward."""
-    real, imag, _, _, info = dgeev(matrix, 0, 0)
-    value = float(np.hypot(real, imag).max()) if info == 0 else float(np.linalg.norm(matrix))
+    # LAPACK scales what is beyond 1e138 or below 1e-138, and some builds do not scale back.
+    size = float(matrix.max()) or 1.0
+    real, imag, _, _, info = dgeev(matrix / size, 0, 0)
+    value = np.hypot(real, imag).max() if info == 0 else np.linalg.norm(matrix / size)
+    value = size * float(value)
     return value * (1.0 + 1e-10) + 1e-300
 
 

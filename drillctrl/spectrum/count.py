@@ -7,7 +7,7 @@ the delayed signals (`drillctrl.delay.reduced`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.characteristic import magnitude_bound
+from drillctrl.spectrum.parts import parts
 
 IntArray = npt.NDArray[np.int64]
 _LARGEST_STEP = 1.2
@@ -94,7 +95,16 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
     """
     bound = magnitude_bound(system, line)
     small = is_small(system.order, bound * system.max_delay)
-    return follow(_SmallLoop(system) if small else reduced(system), line, bound).result
+    result = follow(_SmallLoop(system) if small else reduced(system), line, bound).result
+    if result.count is not None:
+        return result
+    # What cannot be followed as a whole may be in its parts.
+    every = parts(system)
+    if len(every) == 1:
+        return result
+    counts = [count_right_of(part, line).count for part in every]
+    known = [count for count in counts if count is not None]
+    return replace(result, count=sum(known)) if len(known) == len(counts) else result
 
 
 def is_small(order: int, turns: float) -> bool:
@@ -207,6 +217,7 @@ def _traced(loops: _Loops, line: float, limits: FloatArray) -> _Traced:
     turns = limits * loops.delays.max(axis=1, initial=0.0)
     undecided = ~(turns < 0.5 * _MAX_POINTS)
     turns[undecided] = 0.0
+    limits = np.where(undecided, 1.0, limits)
     places = [
         _first_places(loops, b, t) for b, t in zip(limits.tolist(), turns.tolist(), strict=True)
     ]

@@ -182,7 +182,8 @@ def _multiple_root(
     for reach in (radius, 0.5 * radius, 0.25 * radius):
         ring = reach * _CIRCLE
         slope = characteristic.log_derivative(system, centre + ring)
-        count = complex((slope * ring).mean())
+        with np.errstate(invalid="ignore"):
+            count = complex((slope * ring).mean())
         # A root that was not gathered may stand close outside, and would pull at the mean.
         if abs(count - size) < _SHARP_COUNT or reach < 8.0 * spread:
             break

@@ -15,6 +15,8 @@ EPSILON = float(np.finfo(float).eps)
 # An iteration that comes to rest with steps larger than this has found a multiple root, or
 # nothing: at a root Δ is singular to so much.
 _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
+# Relative steps about a root of high multiplicity, at most.
+_ABOUT = 0.05
 
 
 def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
@@ -66,13 +68,16 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
         done |= stalled | square | (size <= 4 * EPSILON * scale)
         if done.all():
             break
-    rough = np.flatnonzero(done & (last > _ROUGH_STEP * (1.0 + np.abs(s))))
+    scale = 1.0 + np.abs(s)
+    # Members of a multiple root may still move about it: where Δ is singular they are it.
+    still = ~done & (last < _ABOUT * scale)
+    rough = np.flatnonzero(still | (done & (last > _ROUGH_STEP * scale)))
     if rough.size:
-        done[rough] = _are_roots(system, s[rough])
+        done[rough] = are_roots(system, s[rough])
     return s, done
 
 
-def _are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
+def are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
     """Whether Δ is singular to rounding: of a multiple root more cannot be told."""
     rest = characteristic.smallest_singular(system, s)
     return np.asarray(rest <= _SINGULAR * characteristic.weight(system, s))
@@ -86,7 +91,7 @@ def _polish_one(system: DelaySystem, s: complex) -> tuple[complex, bool]:
         step = newton / (1.0 - newton / (2j * s.imag)) if s.imag else complex(newton.real)
         size, scale = abs(step), 1.0 + abs(s)
         if size >= last and size < 1e-3 * scale:
-            return s, size <= _ROUGH_STEP * scale or bool(_are_roots(system, np.array([s]))[0])
+            return s, size <= _ROUGH_STEP * scale or bool(are_roots(system, np.array([s]))[0])
         s -= step * min(1.0, 0.3 * scale / max(size, 1e-300))
         s = complex(s.real, abs(s.imag))
         last = size

@@ -22,7 +22,8 @@ from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.climb import MOST_ROOTS, Climb
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.multiplicity import CLOSE, Root, resolve
-from drillctrl.spectrum.polishing import polish
+from drillctrl.spectrum.parts import parts
+from drillctrl.spectrum.polishing import are_roots, polish
 from drillctrl.spectrum.pseudospectral import (
     MAX_DEGREE,
     degree_for_reach,
@@ -60,8 +61,32 @@ def _gather(system: DelaySystem, depth: float, line: float | None = None) -> _Ga
     """
     if not system.delays:
         return _eigenvalues(system, depth, line)
-    found = _collocated(system, depth, line)
-    return _counted(system, depth, line) if found is None else found
+    for gather in (_collocated, _apart):
+        found = gather(system, depth, line)
+        if found is not None:
+            return found
+    return _counted(system, depth, line)
+
+
+def _apart(system: DelaySystem, depth: float, line: float | None) -> _Gathered | None:
+    """Return the roots of the parts of a system; None if it has one part or they do not fit."""
+    every = parts(system)
+    if len(every) == 1 and every[0].delays == system.delays:
+        return None
+    try:
+        found = [_gather(part, depth, line) for part in every]
+    except UndecidedError:
+        return None
+    s = np.concatenate([found_there for found_there, _, _ in found])
+    floor = line
+    if floor is None:
+        floor = max(float(s.real.max()) - depth, *(lowest for *_, lowest in found))
+        if depth > 0.0 and not floor < s.real.max():
+            # Numbers so large that a depth is rounded away.
+            return None
+    if not are_roots(system, s).all():
+        return None
+    return s[np.argsort(-s.real, kind="stable")], np.ones(s.size, dtype=bool), floor
 
 
 def _eigenvalues(system: DelaySystem, depth: float, line: float | None) -> _Gathered:
@@ -254,19 +279,20 @@ def characteristic_roots(system: DelaySystem, right_of: float) -> tuple[Root, ..
         raise InputError("right_of", right_of, "another line: roots right of it cannot be counted")
     if counted == 0:
         return ()
-    try:
-        for gather in (_collocated, _counted):
+    why = ""
+    for gather in (_collocated, _apart, _counted):
+        try:
             found = gather(system, 0.0, line)
             if found is None:
                 continue
             roots = tuple(root for root in resolve(system, *found[:2]) if root.rightmost >= line)
-            if _total(roots) == counted:
-                return _slowed(roots, unit)
-    except UndecidedError as error:
-        raise InputError("right_of", right_of, f"another line: {error.permitted}") from None
-    raise InputError(
-        "right_of", right_of, f"another line: {counted} roots are counted, {_total(roots)} found"
-    )
+        except UndecidedError as error:
+            why = why or error.permitted
+            continue
+        if _total(roots) == counted:
+            return _slowed(roots, unit)
+        why = f"{counted} roots are counted, {_total(roots)} found"
+    raise InputError("right_of", right_of, f"another line: {why}")
 
 
 def _in_own_units(system: DelaySystem) -> tuple[DelaySystem, float]:

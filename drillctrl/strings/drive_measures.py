@@ -13,14 +13,13 @@ from drillctrl.base.text import finite_or_none
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_roots import DriveRoot, drive_roots
+from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.slopes import (
     CriticalSlope,
     ModeSlope,
     drive_delay_margin,
-    drive_is_stable,
     mode_slopes,
-    weakest_slope,
 )
 
 # Hz, that reflections are told and drawn at.
@@ -73,13 +72,10 @@ class DriveMeasures:
     ----------
     control : DriveControl
         The law.
-    stable : bool
-        Whether string and drive are, with a free bit.
+    verdict : DriveVerdict
+        Whether the law does the string good or harm.
     modes : tuple of DriveMode
         The first modes of torsion.
-    weakest : CriticalSlope or None
-        The smallest critical slope of all modes up to 30 Hz and where; None where no slope makes
-        any of them grow.
     delay_margin : float
         s by which the drive may act later; nan where it is unstable.
     swing : (float, float) or None
@@ -93,15 +89,24 @@ class DriveMeasures:
     """
 
     control: DriveControl
-    stable: bool
+    verdict: DriveVerdict
     modes: tuple[DriveMode, ...]
-    weakest: CriticalSlope | None
     delay_margin: float
     swing: tuple[float, float] | None
     frequencies: FloatArray
     reflection: FloatArray
     impedance: ComplexArray
     roots: tuple[DriveRoot, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Whether string and drive are, with a free bit."""
+        return self.verdict.stable
+
+    @property
+    def weakest(self) -> CriticalSlope | None:
+        """The smallest critical slope of all modes up to 30 Hz; None where none makes any grow."""
+        return self.verdict.weakest
 
     @property
     def smallest_slope(self) -> float:
@@ -113,6 +118,8 @@ class DriveMeasures:
         return {
             "structure": self.control.name,
             "stable": self.stable,
+            "recommended": self.verdict.recommended,
+            "reason": self.verdict.reason(),
             "smallest_critical_slope": self.smallest_slope,
             "weakest_mode": self.weakest
             and {
@@ -159,9 +166,8 @@ def measure_drive(
     s = 2j * math.pi * frequencies
     return DriveMeasures(
         control,
-        drive_is_stable(line, control),
+        drive_verdict(line, control),
         tuple(modes),
-        weakest_slope(line, control),
         drive_delay_margin(line, control),
         control.saturating_swing(held),
         frequencies,

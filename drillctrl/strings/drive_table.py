@@ -15,17 +15,17 @@ from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_figure
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
-from drillctrl.base.text import finite_or_none
+from drillctrl.base.text import finite_or_none, wrapped
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.changed import changed_rig
-from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
+from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
 from drillctrl.strings.drives import drive_control, machine_of
 from drillctrl.strings.drives_words import drive_settings
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.line import Line
-from drillctrl.strings.slopes import drive_is_stable, lowest_impedance, weakest_slope
+from drillctrl.strings.slopes import lowest_impedance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +50,8 @@ class DriveTable:
     between : tuple of float
         Weakest slope halfway to the next depth, under the worse of the laws on both sides,
         N m s/rad; one less than depths. Laws are held to there.
+    harm : str or None
+        At which of these depths a law does harm, and what; None where none does.
     elapsed_seconds : float
         Wall time.
     """
@@ -59,6 +61,7 @@ class DriveTable:
     depths: tuple[float, ...]
     drives: tuple[DriveMeasures, ...]
     between: tuple[float, ...]
+    harm: str | None
     elapsed_seconds: float
 
     @property
@@ -82,6 +85,8 @@ class DriveTable:
                 {
                     "depth": depth,
                     "stable": drive.stable,
+                    "recommended": drive.verdict.recommended,
+                    "reason": drive.verdict.reason(),
                     "smallest_critical_slope": drive.smallest_slope,
                     "weakest_slope": weakest and (weakest.slope if drive.stable else 0.0),
                     "weakest_frequency": weakest and weakest.frequency,
@@ -100,6 +105,8 @@ class DriveTable:
             "structure": self.structure,
             "top_drive": asdict(self.drives[0].control.machine),
             "stable": self.stable,
+            "recommended": self.harm is None,
+            "reason": self.harm,
             "nodes": [{**row, "law": law} for row, law in zip(self._rows(), laws, strict=True)],
             "elapsed_seconds": self.elapsed_seconds,
         }
@@ -139,6 +146,8 @@ class DriveTable:
         if self.between:
             stood = f"{slope.per_si * min(self.between):.4g} {per}"
             lines.append(f"Held to the middle between depths, laws stand {stood} there")
+        if self.harm is not None:
+            lines.append(wrapped(f"Refused: at {self.harm}."))
         return "\n".join(lines)
 
     def _laws(self) -> list[tuple[float, DriveMeasures]]:
@@ -203,16 +212,21 @@ def drive_table(rig: Rig, structure: str, depths: Sequence[float]) -> DriveTable
         measure_drive(each.string, control, falling, _MODES)
         for each, control in zip(rigs, controls, strict=True)
     )
+    judged = [(depth, drive.verdict) for depth, drive in zip(depths, drives, strict=True)]
     between = []
     for i in range(len(rigs) - 1):
-        line = changed_rig(rig, depth=0.5 * (depths[i] + depths[i + 1])).string.torsion
-        between.append(min(_stands(line, control) for control in controls[i : i + 2]))
+        middle = 0.5 * (depths[i] + depths[i + 1])
+        line = changed_rig(rig, depth=middle).string.torsion
+        laws = [drive_verdict(line, control) for control in controls[i : i + 2]]
+        between.append(min(_stands(line, law) for law in laws))
+        judged += [(middle, law) for law in laws]
+    refused = (f"{depth:.6g} m {law.reason()}" for depth, law in judged if not law.recommended)
+    harm = next(refused, None)
     elapsed = time.perf_counter() - began
-    return DriveTable(rig, structure, tuple(depths), drives, tuple(between), elapsed)
+    return DriveTable(rig, structure, tuple(depths), drives, tuple(between), harm, elapsed)
 
 
-def _stands(line: Line, control: DriveControl) -> float:
-    if not drive_is_stable(line, control):
+def _stands(line: Line, law: DriveVerdict) -> float:
+    if not law.stable:
         return 0.0
-    found = weakest_slope(line, control)
-    return lowest_impedance(line) if found is None else found.slope
+    return lowest_impedance(line) if law.weakest is None else law.weakest.slope

@@ -51,6 +51,8 @@ def comparison_summary(
         rows.append(("Top swing at the limit, rpm", swings))
     alone = ["yes" if drive.stable else "NO" for drive in drives]
     rows.append(("Stable with a free bit", alone))
+    good = ["yes" if drive.verdict.recommended else "NO" for drive in drives]
+    rows.append(("Stands as much as a stiff drive", good))
     width = max(len(label) for label, _ in rows) + 2
     columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
     head = [
@@ -67,7 +69,14 @@ def comparison_summary(
         f"{label:<{width}}{''.join(f'{cell:>{columns}}' for cell in cells)}".rstrip()
         for label, cells in rows
     ]
-    return "\n".join([*head, *table])
+    refused = [drive for drive in drives if not drive.verdict.recommended]
+    tail = [wrapped(refusal(drive, language)) for drive in refused]
+    return "\n".join([*head, *table, *tail])
+
+
+def refusal(drive: DriveMeasures, language: Language = SI) -> str:
+    """Say that a law does harm, and why."""
+    return f"Refused: {drive.control.name}, {drive.verdict.reason(language)}."
 
 
 def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: Language) -> str:

@@ -52,6 +52,7 @@ PARTS: dict[str, dict[str, Dimension | None]] = {
         "lag": units.TIME,
         "encoder": units.TIME,
         "torque_filter": units.TIME,
+        "encoder_counts": None,
     },
     "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
     "mud": {"density": units.DENSITY},
@@ -64,7 +65,7 @@ PARTS: dict[str, dict[str, Dimension | None]] = {
 # What may be left out: whole tables, and keys of tables.
 _OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
 _OPTIONAL = (
-    *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
+    *("torque_limit", "delay", "lag", "encoder", "torque_filter", "encoder_counts"),
     *("torsional", "axial", "kelvin_voigt"),
     *("stiffness", "block_mass", "feed_gain"),
 )
@@ -176,14 +177,17 @@ def fitted_errors(source: str | Path) -> dict[str, float]:
 
 
 def _string_rig(data: Mapping[str, Any], path: str, folder: Path | None) -> StringRig:
-    _check_keys(data, ("sections", *PARTS), path, _OPTIONAL_PARTS)
-    found: dict[str, dict[str, Any]] = {}
+    lacking = [_lacking(data, ("sections", *PARTS), path, _OPTIONAL_PARTS)]
     for part, known in PARTS.items():
         given = data.get(part, {})
         if not isinstance(given, dict):
             raise InputError(f"{part} in {path}", given, f"a table, [{part}]")
         if part in data:
-            _check_keys(given, known, f"[{part}] of {path}", _OPTIONAL)
+            lacking.append(_lacking(given, known, f"[{part}] of {path}", _OPTIONAL))
+    _refuse_lacking(lacking)
+    found: dict[str, dict[str, Any]] = {}
+    for part, known in PARTS.items():
+        given = data.get(part, {})
         found[part] = {
             key: value
             if known[key] is None
@@ -239,9 +243,10 @@ def _weight_control(
         return WeightControl(**{name: hoisting[name] for name in names})
 
 
-def _check_keys(
+def _lacking(
     given: Mapping[str, Any], known: Iterable[str], where: str, optional: Collection[str]
-) -> None:
+) -> str:
+    """Return the names that must be there and are not, and where; empty if none is missing."""
     names = list(known)
     for key in given:
         if key not in names:
@@ -249,8 +254,27 @@ def _check_keys(
             hint = f"; did you mean {near[0]}?" if near else ""
             raise InputError(f"key in {where}", key, f"one of {', '.join(names)}{hint}")
     missing = [key for key in names if key not in given and key not in optional]
-    if missing:
-        raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
+    return f"{', '.join(missing)} in {where}" if missing else ""
+
+
+def _refuse_lacking(lacking: Iterable[str]) -> None:
+    """Say all that is missing at once."""
+    told = "; ".join(filter(None, lacking))
+    if told:
+        raise InputError(told, "(missing)", "given")
+
+
+def _each_section(rows: Iterable[tuple[str, Mapping[str, Any]]]) -> tuple[Section, ...]:
+    found, lacking = [], []
+    for where, row in rows:
+        try:
+            found.append(_section(row, where))
+        except InputError as error:
+            if error.value != "(missing)":
+                raise
+            lacking.append(error.parameter)
+    _refuse_lacking(lacking)
+    return tuple(found)
 
 
 def _sections(given: Any, path: str, folder: Path | None) -> tuple[Section, ...]:
@@ -259,11 +283,8 @@ def _sections(given: Any, path: str, folder: Path | None) -> tuple[Section, ...]
     if not isinstance(given, list) or not given or not all(isinstance(r, dict) for r in given):
         wanted = "tables, [[sections]]" + (", or the name of a CSV file" if folder else "")
         raise InputError(f"sections in {path}", given, wanted)
-    found = []
-    for i, row in enumerate(given, 1):
-        named = {_ALSO.get(key.lower(), key.lower()): value for key, value in row.items()}
-        found.append(_section(named, f"section {i} of {path}"))
-    return tuple(found)
+    rows = [{_ALSO.get(key.lower(), key.lower()): row[key] for key in row} for row in given]
+    return _each_section((f"section {i} of {path}", row) for i, row in enumerate(rows, 1))
 
 
 @checks_kinds
@@ -303,7 +324,7 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
     for name, title in zip(names, table[0], strict=True):
         if name not in COLUMNS:
             raise InputError(f"column of {path}", title, f"one of {', '.join(COLUMNS)}")
-    sections = []
+    rows = []
     for line, row in enumerate(table[1:], 2):
         where = f"row {line} of {path}"
         if len(row) != len(names):
@@ -315,8 +336,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
                 continue
             bare = re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", value)
             cells[name] = f"{value} {unit}" if unit and bare and COLUMNS[name] else value
-        sections.append(_section(cells, where))
-    return tuple(sections)
+        rows.append((where, cells))
+    return _each_section(rows)
 
 
 def _section(row: Mapping[str, Any], where: str) -> Section:
@@ -329,8 +350,8 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
     }
     bought = pipe(str(row["pipe"])) if "pipe" in row else None
     kind = _KINDS.get(str(row.get("type", bought.kind if bought else "")).lower())
-    if kind is None:
-        raise InputError(f"type in {where}", row.get("type", "(missing)"), ", ".join(_KINDS))
+    if kind is None and "type" in row:
+        raise InputError(f"type in {where}", row["type"], ", ".join(_KINDS))
     material = str(row.get("material", "steel")).lower()
     if material not in MATERIALS:
         raise InputError(f"material in {where}", row["material"], f"one of {', '.join(MATERIALS)}")
@@ -349,8 +370,9 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
             joints = max(1, round(value["length"] / value["joint_length"]))
     needed = ("length", "outer_diameter", "inner_diameter")
     missing = [name for name in needed if value.get(name) is None]
-    if missing:
-        raise InputError(f"{', '.join(missing)} in {where}", "(missing)", "given")
+    if kind is None or missing:
+        names = missing if kind else ["type", *missing]
+        raise InputError(f"{', '.join(names)} in {where}", "(missing)", "given")
     own = {
         field: value[name]
         for field, name in (
@@ -358,17 +380,28 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
         )
         if name in value
     }  # fmt: skip
-    return Section(
-        str(row.get("name", row.get("pipe", kind))),
-        kind,
-        value["length"],
-        value["outer_diameter"],
-        value["inner_diameter"],
-        _tool_joint(value, where) or (bought.tool_joint if bought else None),
-        joints,
-        value.get("weight"),
-        replace(MATERIALS[material], **own),
-    )
+    name = str(row.get("name", row.get("pipe", kind)))
+    with blamed_on(where, _written(row, name)):
+        return Section(
+            name,
+            kind,
+            value["length"],
+            value["outer_diameter"],
+            value["inner_diameter"],
+            _tool_joint(value, where) or (bought.tool_joint if bought else None),
+            joints,
+            value.get("weight"),
+            replace(MATERIALS[material], **own),
+        )
+
+
+def _written(row: Mapping[str, Any], name: str) -> dict[str, tuple[str, object]]:
+    """Return what stands in a row for what a section checks; lengths follow from joints too."""
+    short = {"outer_diameter": "OD", "inner_diameter": "ID"}
+    names = {f"{short.get(key, key)} of {name}": key for key in ("length", "weight", *short)}
+    names |= {f"{short[key]} of tool joint": f"tool_joint_{key}" for key in short}
+    names |= {f"tool joint length{of}": "tool_joint_length" for of in ("", f" of {name}")}
+    return {said: (key, row[key]) for said, key in names.items() if key in row}
 
 
 def _tool_joint(value: Mapping[str, Any], where: str) -> ToolJoint | None:

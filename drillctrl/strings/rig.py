@@ -93,6 +93,11 @@ class StringRig(Rig):
             wanted = "left out under a control of the weight, which is softer than ropes"
             raise InputError("hoisting stiffness", self.string.hoisting_stiffness, wanted)
 
+    @property
+    def depth(self) -> float:
+        """Length of the string, m."""
+        return self.string.length
+
     def hoist(self) -> tuple[Hoist, ...]:
         """Return what feeds the string, if that is not imposed, as a part of a plant."""
         control = self.weight_control

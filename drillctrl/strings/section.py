@@ -61,7 +61,7 @@ class ToolJoint:
 
     def __post_init__(self) -> None:
         _check_diameters("tool joint", self.outer_diameter, self.inner_diameter)
-        checked_number("tool joint length", self.length, 0.0, 5.0, open_low=True)
+        checked_number("tool joint length", self.length, 0.0, 5.0, open_low=True, unit="m")
 
 
 @dataclass(frozen=True)
@@ -106,15 +106,18 @@ class Section:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise InputError(f"type of {self.name}", self.kind, f"one of {', '.join(KINDS)}")
-        checked_number(f"length of {self.name}", self.length, 0.0, 2e4, open_low=True)
+        checked_number(f"length of {self.name}", self.length, 0.0, 2e4, open_low=True, unit="m")
         _check_diameters(self.name, self.outer_diameter, self.inner_diameter)
         if self.joints < 1:
             raise InputError(f"joints of {self.name}", self.joints, "at least 1")
         if self.weight is not None:
-            checked_number(f"weight of {self.name}", self.weight, 0.0, 2e3, open_low=True)
+            checked_number(
+                f"weight of {self.name}", self.weight, 0.0, 2e3, open_low=True, unit="kg/m"
+            )
         if self.tool_joint is not None and self.tool_joint.length >= self.joint_length:
             wanted = f"less than a joint, {self.joint_length:g} m"
-            raise InputError(f"tool joint length of {self.name}", self.tool_joint.length, wanted)
+            shown = f"{self.tool_joint.length:g} m"
+            raise InputError(f"tool joint length of {self.name}", shown, wanted)
 
     @property
     def joint_length(self) -> float:
@@ -179,8 +182,8 @@ def _polar(outer: float, inner: float) -> float:
 
 
 def _check_diameters(name: str, outer: float, inner: float) -> None:
-    checked_number(f"OD of {name}", outer, 0.0, 1.0, open_low=True)
-    checked_number(f"ID of {name}", inner, 0.0, 1.0)
+    checked_number(f"OD of {name}", outer, 0.0, 1.0, open_low=True, unit="m")
+    checked_number(f"ID of {name}", inner, 0.0, 1.0, unit="m")
     if inner >= outer:
         raise InputError(
             f"ID of {name}", f"{inner * 1e3:g} mm", f"below its OD, {outer * 1e3:g} mm"

@@ -11,6 +11,8 @@ from drillctrl.base.errors import InputError
 
 _COARSE = 0.4
 _ROUNDS = 40
+# Share of the height from which the straight side is sampled by ratios.
+_NEAR = 1e-7
 
 
 def zeros_right_of(
@@ -34,7 +36,9 @@ def zeros_right_of(
     InputError
         If a zero lies on the contour.
     """
-    side = line + 1j * np.linspace(-height, height, count)
+    # A string that turns freely has zeros beside 0 that turn the phase in one short stretch.
+    near = np.geomspace(_NEAR * height, height, count)
+    side = line + 1j * np.sort([*np.linspace(-height, height, count), *-near[:-1], *near[:-1], 0.0])
     arc = line + height * np.exp(1j * np.linspace(0.5, -0.5, count) * np.pi)
     path = np.concatenate([side, arc[1:]])
     values = function(path)

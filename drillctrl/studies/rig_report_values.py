@@ -106,7 +106,7 @@ class ReportValues:
     def recommended(self) -> bool:
         """Whether a control is recommended: it was tried, and does no harm on the string."""
         if self.drives is not None:
-            return self.drives.drives[-1].stable and self._does_no_harm
+            return self.drives.drives[-1].verdict.recommended and self._does_no_harm
         design = self.design
         return design is not None and design.recommended is True and self._does_no_harm
 

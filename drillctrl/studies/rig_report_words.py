@@ -116,7 +116,10 @@ def _at_bit(found: ReportValues) -> list[str]:
     for change in found.gains.quieter:
         if change.kind == "speed":
             speed = found.language.text("angular_rate", change.value * found.point.rotary_speed)
-            told.append(f"At {speed} and the same {rate} the bit keeps turning from every start.")
+            told.append(
+                f"At {speed} and the same {rate} the bit keeps turning, after a small "
+                "disturbance and after kicks by half the speed."
+            )
     if found.recommended:
         rows = gain_settings(design, found.language)
         settings = ", ".join(f"{name.partition(',')[0]} {value}" for name, value in rows)

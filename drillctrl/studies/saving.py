@@ -19,59 +19,30 @@ from drillctrl.base.codec import decode, encode
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import check_regular, write_text
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.delay.structure import FeedbackStructure, Tie
-from drillctrl.delay.system import DelaySystem
-from drillctrl.designs import loop_analysis, mode_shift, trials, verdict, worst_case
-from drillctrl.designs.controlled_swings import ControlledSwing, OnMotion
-from drillctrl.designs.drilling import Drilling
-from drillctrl.designs.result import Analysis, Design
-from drillctrl.designs.swings import Swing
-from drillctrl.drilling.case import Case
+from drillctrl.designs.result import Analysis
 from drillctrl.drilling.plant import Plant, paper_plant
-from drillctrl.drilling.point import OperatingPoint, RigPoint
-from drillctrl.drilling.rig import Rig
-from drillctrl.simulation import outcome, starts, status
-from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kept import kept_run, restored_run
 from drillctrl.simulation.result import Simulation
-from drillctrl.simulation.scenario import Change, Scenario
-from drillctrl.spectrum.multiplicity import Root
 from drillctrl.spectrum.roots import spectral_abscissa
-from drillctrl.strings import drill_string, drive_control, section
-from drillctrl.strings.rig import StringRig, WeightControl
 from drillctrl.studies.campaign import Campaign
+from drillctrl.studies.saved_kinds import CLASSES, RESULTS, Result
 from drillctrl.studies.trial import OUTCOMES
-from drillctrl.synthesis import certificate, family, objectives
-from drillctrl.tables.grid import Axis, Grid
 
 SCHEMA = "drillctrl/result/1"
 # A run of a million steps has some hundred million digits.
 MAX_BYTES = 1_000_000_000
-_RESULTS = (Design, Analysis, Simulation, Campaign)
-_NAMES = ", ".join(kind.__name__ for kind in _RESULTS)
-_PARTS: tuple[type, ...] = (
-    *(Design, Analysis, Campaign, Case, OperatingPoint, RigPoint, Rig, StringRig, DelaySystem),
-    *(FeedbackStructure, Tie, Controller, Scenario, Change, Root, Axis, Grid),
-    *(loop_analysis.LoopAnalysis, loop_analysis.Certificate, loop_analysis.SpectralRadius),
-    *(verdict.Verdict, trials.Trial, starts.Start, mode_shift.ModeShift),
-    *(outcome.Figures, status.Outcome, status.Status),
-    *(objectives.Exact, objectives.SemiDiscrete, objectives.Robust, objectives.HInfinity),
-    *(objectives.Requirements, worst_case.WorstCase, certificate.OptimalityCertificate),
-    *(family.ActiveRoot, Drilling, Swing, ControlledSwing, OnMotion),
-    *(drill_string.DrillString, drill_string.Damping, section.Section),
-    *(section.Material, section.ToolJoint, drive_control.DriveMachine, WeightControl),
-)
-_CLASSES = {kind.__name__: kind for kind in _PARTS}
+_NAMES = ", ".join(kind.__name__ for kind in RESULTS)
 
 
 @checks_kinds
-def save_result(result: Design | Analysis | Simulation | Campaign, path: str | Path) -> None:
+def save_result(result: Result, path: str | Path) -> None:
     """Write a result to a JSON file, whole or not at all; `load_result` reads it.
 
     Parameters
     ----------
-    result : Design, Analysis, Simulation or Campaign
-        The result, of any plant.
+    result : Design, Analysis, Simulation, Campaign, Comparison, VibrationMap or RigReport
+        The result, of any plant; also a StabilityChart, StabilisableChart or StabilityVolume,
+        a BitResponse, BitBand or DrillingMotion.
     path : str or Path
         A name that ends in .json.
 
@@ -84,14 +55,13 @@ def save_result(result: Design | Analysis | Simulation | Campaign, path: str | P
         If the file cannot be written; an existing one is then left as it was.
     """
     _check_ending(path)
-    if not isinstance(result, _RESULTS):
+    if not isinstance(result, RESULTS):
         raise InputError("result", type(result).__name__, f"one of {_NAMES}")
-    kept = kept_run(result) if isinstance(result, Simulation) else result
     try:
-        if isinstance(kept, dict):
-            content = {"Simulation": encode(kept, _CLASSES, _plant_text)["map"]}
+        if isinstance(result, Simulation):
+            content = {"Simulation": _plain(result)["run"]}
         else:
-            content = {type(result).__name__: encode(kept, _CLASSES, _plant_text)}
+            content = {type(result).__name__: encode(result, CLASSES, _plain)}
     except TypeError as error:
         wanted = f"made of what drillctrl defines, not of {error}"
         raise InputError("result", type(result).__name__, wanted) from None
@@ -103,9 +73,7 @@ def save_result(result: Design | Analysis | Simulation | Campaign, path: str | P
 
 
 @checks_kinds
-def load_result(
-    path: str | Path, plant: Plant | None = None
-) -> Design | Analysis | Simulation | Campaign:
+def load_result(path: str | Path, plant: Plant | None = None) -> Result:
     """Read a result that `save_result` wrote.
 
     Nothing in a file is ever executed, and what can be checked against the physics is: the
@@ -122,7 +90,7 @@ def load_result(
 
     Returns
     -------
-    Design, Analysis, Simulation or Campaign
+    Design, Analysis, Simulation, Campaign or another of what `save_result` takes
         As it was saved.
 
     Raises
@@ -150,7 +118,10 @@ def _check_ending(path: str | Path) -> None:
         raise InputError("result", str(path), "a name that ends in .json")
 
 
-def _plant_text(value: Any) -> Any:
+def _plain(value: Any) -> Any:
+    """Return plants by their texts, and of runs what they follow from."""
+    if isinstance(value, Simulation):
+        return {"run": encode(kept_run(value), CLASSES, _plain)["map"]}
     return {"plant": value.text} if isinstance(value, Plant) else None
 
 
@@ -158,14 +129,14 @@ def _checksum(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode("utf-8")).hexdigest()
 
 
-def _read(document: Any, plant: Plant | None) -> Design | Analysis | Simulation | Campaign:
+def _read(document: Any, plant: Plant | None) -> Result:
     if document.get("schema") != SCHEMA:
         raise ValueError(f"schema {str(document.get('schema'))[:60]!r} instead of {SCHEMA!r}")
     content = document["result"]
     if document.get("checksum") != _checksum(content):
         raise ValueError("a wrong checksum")
     ((name, data),) = content.items()
-    if name not in {kind.__name__ for kind in _RESULTS}:
+    if name not in {kind.__name__ for kind in RESULTS}:
         raise ValueError(f"a result of kind {name[:60]!r}")
     known = [paper_plant(), *_strings(data)] if plant is None else [plant]
 
@@ -175,20 +146,24 @@ def _read(document: Any, plant: Plant | None) -> Design | Analysis | Simulation 
                 return one
         raise ValueError(f"another plant, to be given when it is loaded: {str(text)[:400]}")
 
-    special = {"plant": physics}
+    def run(kept: Any) -> Simulation:
+        return restored_run({key: decode(kept[key], CLASSES, special) for key in kept})
+
+    special = {"plant": physics, "run": run}
     if name == "Simulation":
-        return restored_run({key: decode(item, _CLASSES, special) for key, item in data.items()})
-    result: Design | Analysis | Campaign = decode(data, _CLASSES, special)
+        return run(data)
+    result: Any = decode(data, CLASSES, special)
     if type(result).__name__ != name:
         raise ValueError(f"a {type(result).__name__} in place of a {name}")
     if isinstance(result, Analysis):
         _check_analysis(result)
-    else:
+    elif isinstance(result, Campaign):
         _check_campaign(result)
     # What cannot be told is of another kind than it should be.
-    result.summary()
-    json.dumps(result.to_dict(), allow_nan=False)
-    return result
+    if hasattr(result, "summary"):
+        result.summary()
+        json.dumps(result.to_dict(), allow_nan=False)
+    return result  # type: ignore[no-any-return]
 
 
 def _strings(data: Any) -> list[Plant]:
@@ -198,7 +173,7 @@ def _strings(data: Any) -> list[Plant]:
     if not isinstance(data, Mapping):
         return []
     if data.get("is") == "StringRig":
-        return [paper_plant(**decode(data, _CLASSES).hardware())]
+        return [paper_plant(**decode(data, CLASSES).hardware())]
     return [plant for item in data.values() for plant in _strings(item)]
 
 

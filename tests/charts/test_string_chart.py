@@ -116,8 +116,10 @@ def test_weight_and_rate_show_the_same_boundary():
     assert compared > 20
 
 
-def test_depth_and_speed():
+def test_depth_and_speed(monkeypatch):
     """Along the speed there is no closed form: counts, and Newton's method at the edge."""
+    # A string a line, each with its own finite elements.
+    monkeypatch.setattr("drillctrl.charts.chart._STRINGS", 5)
     drawn = chart(turned(), ("depth", 2000, 2200), ("speed", 120, 180), tolerance=5e-2)
     assert drawn.method == "counting"
     line = drawn.lines[len(drawn.lines) // 2]

@@ -24,8 +24,14 @@ from drillctrl import (
     table,
     table1,
 )
-from drillctrl.designs.trials import STARTS, Trial, trial_duration, uncontrolled_runs
-from drillctrl.designs.verdict import judge
+from drillctrl.designs.trials import (
+    STANDING,
+    STARTS,
+    Trial,
+    trial_duration,
+    uncontrolled_runs,
+)
+from drillctrl.designs.verdict import judge, with_engagement
 from drillctrl.simulation.outcome import Figures, figures
 from drillctrl.simulation.status import Outcome
 from drillctrl.tables.grid import Axis, Grid
@@ -224,7 +230,7 @@ BROKEN, TURNS, GROWS = (
 @pytest.mark.parametrize(
     ("mine", "free", "stable", "recommended", "words"),
     [
-        (FINE, SWINGS, True, True, "from every start"),
+        (FINE, SWINGS, True, True, "settles from a small disturbance"),
         (SWINGS, SWINGS, False, False, "no measurable good"),
         (SWINGS, SWINGS, True, False, "do not settle"),
         (Figures(Outcome.ORBIT, 0.23, 0.0, 1.0, 1.0), SWINGS, False, False, "swings more"),
@@ -247,7 +253,19 @@ def test_small_basin_is_said():
     lost = Figures(Outcome.STICK_SLIP, 1.0, 0.1, 1.0, 1.0)
     verdict = judge([Trial(STARTS[0], FINE, lost), Trial(STARTS[1], lost, lost)], True)
     assert verdict.recommended is True
-    assert "not from every start" in verdict.reason
+    assert "settles from a small disturbance, but after a kick forward" in verdict.reason
+    assert "every start" not in verdict.reason
+
+
+def test_what_settles_from_the_three_starts_and_not_from_rest_does_not_contradict_itself():
+    verdict = judge([Trial(start, FINE, SWINGS) for start in STARTS], True)
+    usual = "settles from a small disturbance and from kicks forward and back by half the speed"
+    assert verdict.reason.endswith(usual)
+    back = Figures(Outcome.TURNS_BACK, None, None, None, 1.0)
+    said = with_engagement(verdict, [Trial(STANDING[0], back, SWINGS)], "switch them on late")
+    late = "but switch them on late: after a start from rest"
+    assert said.reason.startswith(f"{verdict.reason}; {late}")
+    assert "every start" not in said.reason
 
 
 def test_outcomes_of_runs():

@@ -9,11 +9,13 @@ import pytest
 import scipy.signal
 
 from drillctrl import (
+    DriveMachine,
     InputError,
     OperatingPoint,
     RigPoint,
     axial_orbit,
     bit_response,
+    characteristic_roots,
     check_rig,
     cli,
     drilling_motion,
@@ -22,12 +24,14 @@ from drillctrl import (
     simulate,
     spectral_abscissa,
     string_preset,
+    string_rig,
     table1,
     top_drive_plant,
     torsional_modes,
     torsional_threshold,
 )
 from drillctrl.drilling.case import as_case
+from drillctrl.motion import response
 from drillctrl.motion.along_report import along_fields, along_summary
 from drillctrl.motion.report import motion_fields
 from drillctrl.motion.torsion import forced_speed, ripple_of
@@ -36,6 +40,10 @@ from tests.motion.fixed_step import fixed_step_response
 
 # One unit of H of table1, sqrt(I Kt), in N·m·s.
 UNIT = math.sqrt(116.0 * 938.0)
+BIT = (
+    "blades", "bit_radius", "rock_strength", "contact_strength", "wearflat_length",
+    "cutter_inclination", "friction_coefficient", "bit_geometry",
+)  # fmt: skip
 
 
 def rig_point(rpm, rop, **changes):
@@ -205,6 +213,24 @@ def test_modes_of_a_string_are_those_of_its_pipes():
     assert ratios == pytest.approx([mode.damping_ratio for mode in pipes], rel=0.02)
 
 
+@pytest.mark.parametrize("drive", [None, DriveMachine(2900.0)], ids=["imposed", "driven"])
+def test_the_mode_of_a_real_string_that_drills_smoothly_is_the_root_of_its_linear_system(drive):
+    """Where the axial motion settles, H is the transfer function of the cut."""
+    paper = string_preset("paper-string")
+    pipe, collars = paper.string.sections
+    string = replace(paper.string, sections=(replace(pipe, length=200.0), collars))
+    bit = {name: getattr(paper, name) for name in BIT}
+    case = as_case(RigPoint(string_rig(string, drive=drive, **bit), 5.0 * math.pi, 20.0 / 3600.0))
+    (mode,) = torsional_modes(case, 1)
+    found = mode_at(case, mode, 0.03, most_periods=40)
+    assert found.response.held == 0.0
+    roots = [root.value for root in characteristic_roots(plant_system(case), -0.03)]
+    near = min(roots, key=lambda root: abs(root - found.root))
+    # H is taken on the axis, the root lies beside it.
+    assert found.root == pytest.approx(near, abs=4e-4)
+    assert abs(found.root - mode.root) > 15 * abs(found.root - near)
+
+
 def test_forced_speed_is_that_of_an_ordinary_integrator():
     (mode,) = torsional_modes(OperatingPoint(5.0, 0.2, 14.0, kappa=0.05))
     times = np.linspace(0.0, 40.0, 4001)
@@ -341,3 +367,38 @@ def test_speeds_between_which_swings_decay(monkeypatch):
         run = simulate(point, duration=81.0, initial={"dx": 0.1, "dtheta": speed})
         _, swings = swing_of(run, 10.0, 80.0)
         assert (swings[-1] > swings[0]) == grows
+
+
+def test_answers_are_kept_by_what_computed_them(tmp_path, monkeypatch):
+    """Other arguments, other sources and a file that was cut short are none of them."""
+    where = OperatingPoint(10.0, 1.75, 14.0)
+
+    def ask(amplitude=0.1, **options):
+        return bit_response(where, 1.0, amplitude, most_periods=40, keep=tmp_path, **options)
+
+    first = ask()
+    (kept,) = tmp_path.iterdir()
+    calls = []
+    real = response._measured
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(response, "_measured", counted)
+    again = ask()
+    assert not calls
+    assert (again.value, again.error, again.periods) == (first.value, first.error, first.periods)
+    assert np.array_equal(again.windows, first.windows)
+    ask(0.11)
+    ask(rtol=1e-6)
+    assert len(calls) == 2
+    kept.write_bytes(kept.read_bytes()[:-9])
+    assert ask().value == first.value
+    assert len(calls) == 3
+    monkeypatch.setattr("drillctrl.base.checkpoint.source_digest", lambda: "other sources")
+    assert ask().value == first.value
+    assert len(calls) == 4
+    assert len(list(tmp_path.iterdir())) == 4
+    with pytest.raises(InputError, match="keep"):
+        bit_response(where, 1.0, 0.1, most_periods=40, keep=kept)

@@ -84,6 +84,23 @@ def test_limits_hold_and_are_reached():
     np.testing.assert_allclose(theta(Controller(*GAINS, limit=1e6)), ideal, atol=1e-9)
 
 
+@pytest.mark.parametrize("rate_limit", [None, 50.0])
+def test_a_held_command_at_its_limit_is_saturated(rate_limit):
+    """Held beyond the limit, or within it where it is limited as it is taken."""
+    period = 0.01
+    limited = Controller(*GAINS, limit=0.3, period=period, rate_limit=rate_limit)
+    run = simulate(POINT, limited, duration=20.0, initial=KICK, rtol=1e-6)
+    given = abs(run.at(period * (np.arange(2000) + 0.5)).torque)
+    assert given.max() == pytest.approx(0.3)
+    share = float((given == 0.3).mean())
+    assert 0.02 < share < 0.9
+    found = sum(b - a for a, b in run.phases("saturated")) / 20.0
+    assert found == pytest.approx(share, abs=1e-9)
+    continuous = simulate(POINT, Controller(*GAINS, limit=0.3), duration=20.0, initial=KICK)
+    near = sum(b - a for a, b in continuous.phases("saturated")) / 20.0
+    assert found == pytest.approx(near, abs=0.03)
+
+
 @pytest.mark.parametrize(
     "limits",
     [

@@ -79,15 +79,58 @@ def test_the_largest_is_the_rate_at_which_returns_close():
     assert found.period == pytest.approx(orbit.period, rel=1e-7)
 
 
+@pytest.mark.parametrize("period", [0.1, 0.4])
+def test_at_rest_under_samples_they_are_the_growth_of_a_run(period):
+    """Of θ from one map to the next, where the slowest three are left: a linear recurrence."""
+    law = {"K1": [-3.82], "K2": [3.61], "period": period, "measurement_delay": 0.3 * period}
+    controller = Controller("case1", **law)
+    rest = simulate(POINT, controller, duration=3.0, rtol=1e-11)
+    time = 0.4
+    found, residuals = multipliers_at(rest, 5.0 * period, time, size=1e-4, directions=8)
+    assert residuals[0] < 1e-7
+    run = simulate(
+        POINT, controller, duration=24.0, initial={"dtheta": 1.0}, model="linear", rtol=1e-12
+    )
+    theta = run.at(np.arange(8.0, 24.0, time)).theta
+    before = np.stack([theta[2:-1], theta[1:-2], theta[:-3]], axis=1)
+    recurrence, *_ = np.linalg.lstsq(before, theta[3:], rcond=None)
+    roots = np.roots([1.0, *-recurrence])
+    for root in found[:3]:
+        assert abs(roots - root).min() < 1e-4
+    if period == time:
+        settled = simulate(POINT, controller, duration=40.0, initial={"dtheta": 0.1}, rtol=1e-10)
+        again = floquet(settled, directions=8)
+        assert again.trivial_error is None
+        assert again.period == pytest.approx(time)
+        assert again.largest == pytest.approx(abs(found[0]), abs=1e-6)
+
+
+def test_an_orbit_under_fast_samples_is_nearly_that_of_the_continuous_law():
+    apart, errors = [], []
+    for period in (None, 0.1, 0.05):
+        controller = Controller("pd", [0.0, 0.05], period=period)
+        run = simulate(POINT, controller, duration=120.0, initial={"dtheta": 1.0}, rtol=1e-9)
+        found = floquet(run, directions=4)
+        apart.append(found.largest)
+        errors.append(found.trivial_error)
+    assert abs(np.array(apart[1:]) - apart[0]).max() < 3e-3
+    assert max(errors) < 3e-3
+    assert errors[2] < 0.7 * errors[1]
+
+
 def test_what_has_no_orbit_is_refused(stick_slip):
     settling = simulate(
         POINT, Controller("case1", [-3.82], [3.61]), duration=60.0, initial={"dtheta": 1.0}
     )
     with pytest.raises(InputError, match="run"):
         floquet(settling)
-    sampled = Controller("case1", [-0.1], [0.1], period=0.01)
-    with pytest.raises(InputError, match="controller"):
-        floquet(simulate(POINT, sampled, duration=60.0, initial={"dtheta": 1.0}))
+    for options, named in (
+        ({"noise": {"theta": 1e-3}}, "controller"),
+        ({"delay": "current"}, "delay"),
+    ):
+        sampled = Controller("case1", [-3.82], [3.61], period=0.1, **options)
+        with pytest.raises(InputError, match=named):
+            floquet(simulate(POINT, sampled, duration=5.0, initial={"dtheta": 1.0}))
     late = Scenario(initial={"dtheta": 1.0}, changes=(Change(50.0, omega0=9.0),))
     with pytest.raises(InputError, match="changed"):
         floquet(simulate(POINT, duration=80.0, scenario=late))

@@ -84,6 +84,25 @@ def test_a_past_of_a_past():
     assert apart(first, third, 12.0) < 1e-8
 
 
+@pytest.mark.parametrize(("point", "kick"), [(BOUNCING, KICK), (POINT, STOPPED)], ids=str)
+def test_a_past_without_what_nothing_looks_at(point, kick):
+    """The rest is the same, and a chain of runs holds no more and more."""
+    run = whole = simulate(point, duration=3.0, initial=kick)
+    for _ in range(3):
+        past, every = run.past(kept=0.0), whole.past()
+        run = simulate(point, duration=3.0, scenario=Scenario(start=past))
+        whole = simulate(point, duration=3.0, scenario=Scenario(start=every))
+        assert np.array_equal(run.motion.x, whole.motion.x)
+        assert np.array_equal(run.motion.torque_on_bit, whole.motion.torque_on_bit)
+        assert past.known < 4.0
+    assert len(past.real) < 0.5 * len(every.real)
+    late = Controller("case1", [-3.82], [3.61], measurement_delay=20.0)
+    with pytest.raises(InputError, match="known for 20"):
+        simulate(point, late, duration=1.0, scenario=Scenario(start=past))
+    enough = run.past(kept=2.5)
+    assert 2.5 <= enough.known < 6.0
+
+
 def test_a_past_that_does_not_fit_is_refused():
     run = simulate(POINT, duration=10.0, initial=KICK)
     other = OperatingPoint(11.0, 2.5, 14.0)

@@ -10,6 +10,7 @@ from drillctrl import (
     Damping,
     DrillString,
     DriveMachine,
+    FallingTorque,
     InputError,
     RigPoint,
     as_case,
@@ -125,6 +126,20 @@ def test_above_the_linear_threshold_nothing_grows(slowed):
     for run in slowed.values():
         quiet = run.swings[(run.speeds > 1.1 * run.linear)]
         assert quiet.max(initial=0.0) < 0.1
+
+
+def test_a_bit_that_stands_does_not_turn_smoothly():
+    """Its drive has the torque that drilling takes, not that to free it again."""
+    weak = rig(DriveMachine(2900.0, torque_limit=1500.0, delay=0.02), length=1000.0)
+    found = slow_down(
+        RigPoint(weak, 45.0 * RPM, 1e-4 / 3600), drive_control("stiff", weak),
+        [45.0 * RPM, 10.0 * RPM], falling=FallingTorque(6000.0, 2.0), hold=30.0,
+    )  # fmt: skip
+    assert found.status == "done"
+    assert 1.0 < found.swings[0] < math.inf
+    assert found.swings[1] == math.inf
+    assert found.to_dict()["swings"][1] is None
+    assert found.stick_slip == pytest.approx(45.0 * RPM)
 
 
 def test_bad_speeds():

@@ -15,10 +15,12 @@ from drillctrl.drilling.motion import stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import STOOD, Scenario
 from drillctrl.simulation.starts import possible_starts, simulate_starts
 from drillctrl.simulation.structure import structure_of
+from drillctrl.strings.drive_rules import transfer_control
 from drillctrl.strings.presets import string_preset
 
 HARMLESS = OperatingPoint(14.0, 0.5, 14.0)
@@ -80,6 +82,14 @@ def test_a_drive_that_is_free_to_turn_has_no_rest():
     for names in ((), ("kick", "kick"), ("moon",)):
         with pytest.raises(InputError, match="start"):
             simulate_starts(HARMLESS, starts=names, duration=1.0)
+
+
+def test_nor_has_one_under_a_law_whose_states_are_no_outputs():
+    rig = string_preset("vertical-3000")
+    own = transfer_control(rig.drive, ([1e3, 1e3], [1.0, 4.0, 6.0, 4.0, 1.0]))
+    case, _ = law_controller(at(rig, 60.0, 10.0), own)
+    assert len(case.plant.state_names) > len(case.plant.output_names)
+    assert "rest" not in possible_starts(case)
 
 
 def test_the_command_says_so(capsys, tmp_path):

@@ -93,7 +93,7 @@ def test_energy_balance(stick_slip):
         return float((values.reshape(-1, 9) @ BOOLE * np.diff(run.times)).sum())
 
     size = integral(abs(power))
-    assert integral(power) == pytest.approx(energy[1] - energy[0], abs=1e-7 * size)
+    assert integral(power) == pytest.approx(energy[1] - energy[0], abs=1e-9 * size)
 
 
 def test_a_very_stiff_spring_is_none():

@@ -103,9 +103,12 @@ def test_presets_are_rigs_too():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("500 ft", "-500 ft"), "length of collar"),
+        (("500 ft", "-500 ft"), "= -500 ft: must be a finite number in (0, 20000] m"),
         (("outer_diameter =", "outer_diametre ="), "key in section 2"),
-        (('inner_diameter = "2 13/16 in"', 'inner_diameter = "9 in"'), "ID of collar = 228.6 mm"),
+        (
+            ('inner_diameter = "2 13/16 in"', 'inner_diameter = "9 in"'),
+            "= 9 in: must be below its OD,",
+        ),
         (("500 ft", "500 kg"), "length in section 2"),
         (("8.5 in", "85 in"), "bit.diameter"),
         (("joints = 200", "joints = 2.5"), "joints in section 1"),
@@ -183,3 +186,16 @@ def test_a_file_of_ones_own_begins_as_a_preset(tmp_path, capsys):
         cli.main(["rig", "check", "table1", "--out", str(tmp_path / "rig.json")])
     assert stop.value.code == 2
     assert "--out = " in capsys.readouterr().err
+
+
+def test_all_that_is_missing_is_told_at_once(tmp_path):
+    (tmp_path / "rig.toml").write_text('sections = "tally.csv"\n[bit]\nblades = 4\n[rock]\n')
+    with pytest.raises(InputError) as told:
+        load_rig(tmp_path / "rig.toml")
+    for name in ("diameter", "wearflat_length", "geometry in [bit]", "strength, contact_strength"):
+        assert name in str(told.value)
+    (tmp_path / "tally.csv").write_text("name,length [m],OD [mm]\na,10,\nb,20,30\n")
+    with pytest.raises(InputError) as told:
+        read_tally(tmp_path / "tally.csv")
+    assert "type, outer_diameter, inner_diameter in row 2" in str(told.value)
+    assert "type, inner_diameter in row 3" in str(told.value)

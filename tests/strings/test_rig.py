@@ -23,6 +23,7 @@ from drillctrl.drilling.case import as_case
 from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.rig import table1
 from drillctrl.strings.catalogue import pipe, pipe_names
+from drillctrl.strings.changed import changed_rig
 from drillctrl.strings.exact import exact_loop
 from drillctrl.strings.model import PipeString
 from drillctrl.strings.presets import PRESETS, paper_string, string_preset
@@ -135,3 +136,15 @@ def test_a_late_drive_has_the_roots_of_the_exact_string():
     ):
         with pytest.raises(InputError, match="late"):
             refused()
+
+
+def test_a_place_says_how_long_the_string_is():
+    """Two depths of one rig are two places; a rig that is lumped has none."""
+    rig = string_preset("vertical-3000")
+    places = [
+        as_case(RigPoint(each, 12.0, 0.002)).place
+        for each in (rig, changed_rig(rig, depth=2500.0), table1())
+    ]
+    assert [place.count(" of string") for place in places] == [1, 1, 0]
+    assert places[0].endswith("3000 m of string")
+    assert places[1].endswith("2500 m of string")

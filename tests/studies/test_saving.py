@@ -16,7 +16,11 @@ from drillctrl import (
     SemiDiscrete,
     analyze,
     as_case,
+    bit_band,
+    bit_response,
     campaign,
+    chart,
+    compare,
     design,
     dimensionless_grid,
     linear_axis,
@@ -24,10 +28,14 @@ from drillctrl import (
     paper_plant,
     save_result,
     simulate,
+    stabilisable_chart,
+    stability_volume,
     string_preset,
     table1,
+    vibration_map,
 )
 from drillctrl.base.codec import decode, encode
+from drillctrl.studies import saved_kinds
 
 from ..strangers import VelocityWeakening
 
@@ -239,3 +247,37 @@ def test_numbers_of_every_kind_survive():
         encode(Some(1), {})
     with pytest.raises(KeyError):
         decode({"is": "Some", "value": 1}, {})
+
+
+RESULTS = {
+    "chart": lambda: chart(RIG, ("speed", 60, 180), ("rop", 5, 40)),
+    "stabilisable": lambda: stabilisable_chart(
+        POINT, ("omega0", 9, 12), ("delta0", 0, 4), "p", first_lines=3, tolerance=0.1
+    ),
+    "volume": lambda: stability_volume(
+        POINT, ("omega0", 9, 10), ("delta0", 0, 2), ("psi", 13, 14), slices=3, lines=3
+    ),
+    "response": lambda: bit_response(RIG, 2.8, 0.03),
+    "band": lambda: bit_band(RIG, 0.03),
+    "comparison": lambda: compare(POINT, ("p",), duration=20.0, trials=False),
+    "map": lambda: vibration_map(
+        RIG, ("speed", 120, 160), ("rop", 10, 20), counts=(2, 2), duration=20.0, refine=0
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_other_results_come_back_to_the_last_digit(tmp_path, name):
+    found = RESULTS[name]()
+    save_result(found, tmp_path / "one.json")
+    again = load_result(tmp_path / "one.json")
+    save_result(again, tmp_path / "two.json")
+    assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
+    assert type(again) is type(found)
+    if hasattr(found, "summary"):
+        assert again.summary() == found.summary()
+        assert again.to_dict() == found.to_dict()
+
+
+def test_no_two_kinds_share_a_name():
+    assert len(saved_kinds.CLASSES) == len(saved_kinds._PARTS) + 1

@@ -25,6 +25,7 @@ from .data import (
     RELEASE_FORWARD,
     RELEASE_REVERSE,
     REVERSE,
+    SAMPLED,
     SCALE,
     STAGES,
     STUCK,
@@ -79,9 +80,15 @@ def next_saturation(settings, history, steps, mode, kind, t, y, work):
     if settings.whole[FEEDBACK] == 0:
         return 0
     rate_of_change(settings, history, steps, mode, t, y, work.rates[STAGES], work.stages[STAGES])
-    saturated = 0
-    for limit in range(2 * settings.whole[INPUTS]):
-        if watched(settings, AT_LIMIT + limit, mode) and work.stages[STAGES, P_ROOM + limit] < 0.0:
+    saturated, m = 0, settings.whole[INPUTS]
+    for limit in range(2 * m):
+        left = work.stages[STAGES, P_ROOM + limit]
+        if watched(settings, AT_LIMIT + limit, mode):
+            beyond = left < 0.0
+        else:
+            # A held command meets no limit on its way: it is at it, or beyond, or not.
+            beyond = settings.whole[SAMPLED] == 1 and limit < m and left <= 0.0
+        if beyond:
             saturated |= 1 << limit
     return saturated
 
