@@ -58,6 +58,7 @@ OF_RIGS = (
     "m",
     "MPa",
     "rad",
+    "N·m/rad",
     "N·m·s/rad",
     "kN·m/√Hz",
 )

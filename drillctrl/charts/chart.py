@@ -99,8 +99,10 @@ class StabilityChart:
         """Return a text for people."""
         plane = self.plane
         name = plane.name or "open loop"
+        share = self.stable_area / (plane.x.span * plane.y.span)
+        what = "Smooth drilling" if plane.case.drills else "The loop"
         lines = [
-            f"Stability chart of {name}",
+            f"{what} is stable on {share:.1%} of this chart: {name}",
             *(
                 f"  {word:<9} {axis.label} in [{axis.low:g}, {axis.high:g}]"
                 for word, axis in (("over", plane.x), ("and", plane.y))

@@ -16,10 +16,9 @@ from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.structures import STRUCTURE_NAMES, preset_structure, soft_torque
 from drillctrl.explorer.rig_text import LONGEST, complaints
-from drillctrl.explorer.state import LAWS, MOVED_LAWS, read_asked, read_rig
+from drillctrl.explorer.state import LAWS, MOVED_LAWS, designed_law, read_asked, read_rig
 from drillctrl.explorer.views import Options, Tell, stability
 from drillctrl.strings.check import check_rig
-from drillctrl.strings.drives import drive_control
 from drillctrl.strings.files import PRESETS
 from drillctrl.strings.rig import StringRig
 
@@ -99,7 +98,7 @@ def _at_bit(structure: FeedbackStructure, rig: Rig | None) -> dict[str, Any]:
 def _law(name: str, rig: StringRig) -> dict[str, Any]:
     gains = []
     if name in MOVED_LAWS:
-        law = drive_control(name, rig).speed
+        law = designed_law(name, rig).speed
         proportional, integral = law.numerator[-2:]
         scales = rig_gain_units(soft_torque(), top_drive_plant(1.0), rig)
         assert scales is not None

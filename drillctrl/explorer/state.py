@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -197,10 +198,16 @@ def _where(
     return RigPoint(rig, speed * math.pi / 30.0, rop / 3600.0), given
 
 
+@functools.lru_cache(maxsize=64)
+def designed_law(name: str, rig: StringRig) -> DriveControl:
+    """Return the law of a rule, which takes seconds to design: the same for all its points."""
+    return drive_control(name, rig)
+
+
 def _law(name: str, rig: StringRig, fields: Mapping[str, Any]) -> DriveControl:
     gains = fields.get("K1")
     if gains is None:
-        return drive_control(name, rig)
+        return designed_law(name, rig)
     stiffness, damping = _numbers("K1", gains, 2)
     return given_control(name, rig, stiffness, damping)
 

@@ -16,11 +16,10 @@ from drillctrl.designs.design import analyze
 from drillctrl.designs.result import Analysis
 from drillctrl.drilling.quantities import root_scales
 from drillctrl.explorer.commands import command_line, python_text
-from drillctrl.explorer.state import Asked
+from drillctrl.explorer.state import Asked, designed_law
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 from drillctrl.spectrum.pseudospectral import approximate_roots, degree_for
 from drillctrl.strings.drive_measures import BAND
-from drillctrl.strings.drives import drive_control
 from drillctrl.strings.rig import StringRig
 from drillctrl.strings.slopes import mode_slopes
 
@@ -128,7 +127,7 @@ def reflection(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     for name in _BESIDE:
         if name != asked.given["structure"]:
             try:
-                laws[name] = drive_control(name, rig)
+                laws[name] = designed_law(name, rig)
             except InputError:
                 # Not every drive can follow every rule.
                 continue

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.figure import BLUE, GREY, ORANGE, new_figure
+from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_figure
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
@@ -176,8 +176,8 @@ class DriveTable:
                 color=GREY,
                 label="all modes, law held to there",
             )
-        ax.set_xlabel(f"length of the string, {deep.unit}")
-        ax.set_ylabel(f"critical slope, {slope.unit}")
+        ax.set_xlabel(axis_name("length of the string", deep.unit))
+        ax.set_ylabel(axis_name("critical slope", slope.unit))
         ax.set_ylim(bottom=0.0)
         ax.legend(fontsize=8)
         return figure

@@ -52,11 +52,11 @@ def plot_drives(drives: Mapping[str, Curves], pipe: float, title: str = "") -> F
             label=name,
         )
     returned.axhline(1.0, color=GREY, lw=0.6)
-    returned.set_ylabel("|r| of the drive, dimensionless")
+    returned.set_ylabel("share of a wave returned |r|, dimensionless")
     returned.set_ylim(bottom=0.0)
     returned.legend(fontsize=8)
     impedance.set_yscale("symlog", linthresh=1.0)
-    impedance.set_ylabel("|Z| (dashed: Re Z) over ζ, dimensionless")
+    impedance.set_ylabel("|Z| over the pipe's (dashed: real part), dimensionless")
     damping.set_yscale("symlog", linthresh=0.1)
     damping.set_ylim(bottom=None if grows else 0.0)
     damping.axhline(0.0, color=GREY, lw=0.6)

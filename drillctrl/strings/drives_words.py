@@ -56,6 +56,8 @@ def comparison_summary(
     width = max(len(label) for label, _ in rows) + 2
     columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
     head = [
+        wrapped(_advice(drives, falling, language)),
+        "",
         f"{language.text('depth', rig.string.length, 6)} of string, "
         f"{per * line.wave_impedance:.4g} {slope} of the uppermost pipe,",
         drive_text(machine, language),
@@ -75,6 +77,31 @@ def comparison_summary(
 def refusal(drive: DriveMeasures, language: Language = SI) -> str:
     """Say that a law does harm, and why."""
     return f"Refused: {drive.control.name}, {drive.verdict.reason(language)}."
+
+
+def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: Language) -> str:
+    """Say what to set of the drive that stands most, and above which speed to stay with it."""
+    best = max(drives, key=lambda drive: drive.smallest_slope)
+    if not best.stable:
+        return "None of these: under each the string swings by itself."
+    told = setting_sentence(best.control, language)
+    speed = threshold_speed(best)
+    if not math.isfinite(speed):
+        return told
+    others = [drive for drive in drives if drive is not best]
+    beside = ", ".join(
+        f"{_rpm(threshold_speed(drive)):.3g} under {drive.control.name}"
+        for drive in others
+        if drive.stable and math.isfinite(threshold_speed(drive))
+    )
+    fall = language.text("torque", falling.drop, 3)
+    told += f" Stay above {_rpm(speed):.3g} rpm with it{f' ({beside})' if beside else ''}, if the"
+    return f"{told} bit's torque falls by {fall} as it turns faster (a guess: measure it)."
+
+
+def threshold_speed(drive: DriveMeasures) -> float:
+    """Return the speed above which all modes looked at stand the falling torque, rad/s."""
+    return max(mode.threshold_speed for mode in drive.modes)
 
 
 def _weakest(drive: DriveMeasures, per: float) -> str:

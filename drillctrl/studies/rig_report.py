@@ -14,6 +14,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import DIMENSIONLESS
+from drillctrl.base.text import wrapped
 from drillctrl.base.workers import Progress, spread_out
 from drillctrl.designs.design import analyze, design
 from drillctrl.designs.report import Report, report
@@ -51,7 +52,7 @@ class RigReport(ReportValues):
 
     def summary(self) -> str:
         """Return its first sentences."""
-        return "\n".join(report_answer(self))
+        return "\n".join(wrapped(text) for text in report_answer(self))
 
     def to_html(self) -> str:
         """Return the page, which needs nothing else and prints to two sheets of A4."""

@@ -11,7 +11,7 @@ from drillctrl.drilling.gain_units import gain_units
 from drillctrl.simulation.status import Outcome
 from drillctrl.strings.check import Mode
 from drillctrl.strings.drive_measures import DriveMeasures
-from drillctrl.strings.drives_words import setting_sentence
+from drillctrl.strings.drives_words import setting_sentence, threshold_speed
 from drillctrl.strings.rig import StringRig
 from drillctrl.studies.rig_report_values import Course, ReportValues
 
@@ -91,11 +91,6 @@ def _of_drive(found: ReportValues) -> list[str]:
             " turns faster (a guess: measure it)."
         )
     return told
-
-
-def threshold_speed(drive: DriveMeasures) -> float:
-    """Return the speed above which all modes looked at stand the falling torque, rad/s."""
-    return max(mode.threshold_speed for mode in drive.modes)
 
 
 def _damping(drive: DriveMeasures) -> str:
@@ -191,7 +186,7 @@ def rig_rows(found: ReportValues) -> Rows:
         rows.append(("Weight in mud", language.text("force", found.check.buoyed_weight)))
         rows += [
             (
-                section.name.capitalize(),
+                section.name[:1].upper() + section.name[1:],
                 f"{language.text('depth', section.length)}, "
                 f"{language.text('length', section.outer_diameter)} outside",
             )

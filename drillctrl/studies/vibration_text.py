@@ -66,7 +66,12 @@ def map_summary(found: MapValues) -> str:
 
 def _range(axis: Axis) -> str:
     unit = f" {axis.unit}" if axis.unit else ""
-    return f"{axis.name.replace('_', ' ')} {axis.low:g} to {axis.high:g}{unit}"
+    return f"{_word(axis)} {axis.low:.4g} to {axis.high:.4g}{unit}"
+
+
+def _word(axis: Axis) -> str:
+    """Return what an axis is called: of a rig in words."""
+    return axis.label.partition(",")[0] if axis.unit else axis.name.replace("_", " ")
 
 
 def _points(found: MapValues) -> str:
@@ -117,7 +122,7 @@ def _at_mark(found: MapValues) -> str:
     distance = ((places - list(found.marked)) / spans) ** 2
     nearest = int(distance.sum(axis=1).argmin())
     units = [f" {axis.unit}" if axis.unit else "" for axis in (found.plane.x, found.plane.y)]
-    names = [axis.name.replace("_", " ") for axis in (found.plane.x, found.plane.y)]
+    names = [_word(axis) for axis in (found.plane.x, found.plane.y)]
     where = ", ".join(
         f"{name} {value:.4g}{unit}"
         for name, value, unit in zip(names, places[nearest].tolist(), units, strict=True)

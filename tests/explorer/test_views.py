@@ -27,6 +27,7 @@ from drillctrl import (
 from drillctrl.designs.design import analyze
 from drillctrl.explorer.answers import answer
 from drillctrl.explorer.rig_text import complaints, rig_as_text, rig_from_text
+from drillctrl.explorer.state import read_asked
 from drillctrl.spectrum import characteristic
 
 RIG = table1()
@@ -193,6 +194,15 @@ def test_a_driven_string_is_analysed_with_its_law():
     own = analyze(as_case(point, driven_plant(rig, drive_control("soft-torque", rig))))
     assert found["data"]["spectral_abscissa"] == pytest.approx(own.spectral_abscissa, rel=1e-6)
     assert "--structure soft-torque" in found["command"]
+
+
+def test_a_law_is_designed_once_for_all_points_of_a_rig():
+    """Its design takes seconds, and each drag of the point asks for it."""
+    state = {**DRIVEN, "structure": "observer-2", "K1": None}
+    laws = [read_asked({**state, "rop": rop}).law for rop in (5.0, 6.0)]
+    assert laws[0] is laws[1]
+    own = drive_control("observer-2", string_preset("vertical-3000"))
+    assert laws[0] == own
 
 
 def test_strings_stand_side_by_side():

@@ -156,3 +156,14 @@ def test_a_rig_without_a_drive_is_refused(run):
         compare_drives(table1(), ["stiff"])
     with pytest.raises(InputError, match="at least one"):
         compare_drives(string_preset("vertical-3000"), [])
+
+
+def test_the_first_sentence_says_what_to_set_and_how_fast_to_turn():
+    """P and I of the law that stands most, and the largest of its threshold speeds."""
+    found = compare_drives(string_preset("vertical-3000"), ["stiff", "soft-torque"])
+    best = max(found.drives, key=lambda drive: drive.smallest_slope)
+    first = " ".join(found.summary().split("\n\n")[0].split())
+    speed = max(mode.threshold_speed for mode in best.modes) * 30.0 / math.pi
+    assert first.startswith("Set P to ")
+    assert best.control.name in first
+    assert f"Stay above {speed:.3g} rpm with it" in first
