@@ -517,9 +517,14 @@ def test_the_command_writes_laws_over_depth_and_at_one(tmp_path, capsys):
     status, told, _ = call(*given)
     assert status == 0
     assert "m: Kp" not in (tmp_path / "drive.h").read_text()
+    assert call(*given, "--real", "float")[0] == 0
+    assert "float, which changes the torque" in (tmp_path / "drive.h").read_text()
     for bad, option in (
         (given[:4], "--limit"), (("--out", out, *given[4:]), "--period"),
-        ((*given, "--real", "float"), "--real"), (("--period", "10 ms"), "--period"),
+        ((*given, "--real", "half"), "--real"),
+        (("--structure", "z-torque", "--real", "float", *given[:2], "--period", "5 ms", *given[4:]),
+         "--real"),
+        (("--period", "10 ms"), "--period"),
         ((*given, "--fmi", "2.0"), "--fmi"), ((*given, "--smooth", "5"), "--smooth"),
         (("--structure", "z-torque", "--out", out, "--period", "20 ms", *given[4:]), "--period"),
         (("--out", str(tmp_path / "Enable.st"), *given[2:]), "--out"),
