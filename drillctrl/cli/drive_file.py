@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from drillctrl.strings.drive_table import DriveTable
 
 ENDINGS = (".c", ".st", ".scl", ".xml", ".fmu")
+# How a file is written, beside what the law is.
+_WRITTEN = ("fmi", "real")
 _COUNTS = ("ramp", "fade", "hold", "watchdog", "release")
-SOURCE_OPTIONS = ("period", "limit", "rate_limit", "fmi", *_COUNTS)
+SOURCE_OPTIONS = ("period", "limit", "rate_limit", "fmi", "real", *_COUNTS)
 
 
 def read_settings(out: str, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -29,6 +31,7 @@ def read_settings(out: str, options: Mapping[str, Any]) -> dict[str, Any]:
         If it is out of range, or a file could not be written under the name.
     """
     from drillctrl.base import units
+    from drillctrl.tables.export_c import check_real
     from drillctrl.tables.export_drive import check_drive_path
 
     fmi = options["fmi"]
@@ -36,6 +39,11 @@ def read_settings(out: str, options: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError("--fmi", fmi, "left out unless --out ends in .fmu")
     with naming("--out", "name", "out"):
         check_drive_path(out, fmi or "3.0")
+    real = options["real"] or "double"
+    if real != "double" and Path(out).suffix.lower() != ".c":
+        raise InputError("--real", real, "left out unless --out ends in .c")
+    with naming("--real", "real"):
+        check_real(real)
     if options["period"] is None:
         raise InputError("--period", "(missing)", f"given for {out}, such as '10 ms'")
     dimensions = (
@@ -47,7 +55,7 @@ def read_settings(out: str, options: Mapping[str, Any]) -> dict[str, Any]:
         if options[name] is not None
     }
     given |= {name: options[name] for name in _COUNTS if options[name] is not None}
-    return {**given, "fmi": fmi or "3.0"}
+    return {**given, "fmi": fmi or "3.0", "real": real}
 
 
 def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> None:
@@ -65,7 +73,7 @@ def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> Non
     if found.harm is not None:
         wanted = f"a law that does no harm before it is exported: at {found.harm}"
         raise InputError("--structure", found.structure, wanted)
-    given = {name: value for name, value in settings.items() if name != "fmi"}
+    given = {name: value for name, value in settings.items() if name not in _WRITTEN}
     controls = [drive.control for drive in found.drives]
     law = sampled_drive(controls, depths=found.depths, **given)
     with naming("--period", "period"):
@@ -77,6 +85,7 @@ def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> Non
     )
 
     def write() -> None:
-        export_drive(law, out, fmi=settings["fmi"])
+        export_drive(law, out, **{name: settings[name] for name in _WRITTEN})
 
-    writing("--out", out, write)
+    with naming("--real", "real"):
+        writing("--out", out, write)

@@ -125,7 +125,7 @@ def plot_drilled(
         )  # fmt: skip
     drawn = ax.scatter(
         _RPM * speed, 1e-3 * weight, c=swing, cmap="YlOrRd", vmin=0.0, vmax=1.5, s=26,
-        edgecolors=GREY, linewidths=0.4,
+        edgecolors=GREY if computed is None else "black", linewidths=0.6,
     )  # fmt: skip
     ax.set_xlabel(axis_name("rotary speed", "rpm"))
     ax.set_ylabel(axis_name("weight on bit", "kN"))

@@ -8,6 +8,7 @@ import pytest
 from drillctrl import (
     Estimate,
     InputError,
+    load_rig,
     read_record,
     study_record,
     table1,
@@ -20,6 +21,7 @@ from drillctrl.records.computed import SeenLaw
 from drillctrl.records.findings import ComputedMap
 from tests.records.other_rig import OtherRig, recorded, write_csv
 from tests.records.test_fitted_rig import fit_of
+from tests.records.wave_rig import WaveRig, wave_recorded
 
 HEAD = "time [s],rpm,torque [kN.m],WOB [kN]"
 
@@ -70,6 +72,24 @@ def test_a_slow_record_says_what_cannot_be_seen(tmp_path):
     assert any("nothing faster than 0.4 Hz is seen" in note for note in study.notes)
     assert any("no string was fitted: that takes 2.1 Hz" in note for note in study.notes)
     assert study.period.value == pytest.approx(4.755, rel=0.02)
+
+
+def test_a_record_of_another_kind_is_fitted(tmp_path):
+    """Travelling waves, gaps, and a law of the bit of another form than the fit's."""
+    rig, off = WaveRig(length=3200.0, damping=0.2), (1.08, 0.95)
+    time, top, torque, bit = wave_recorded(rig, 85.0, 240.0, gaps=1)
+    write_csv(tmp_path / "waves.csv", time, top, torque)
+    (tmp_path / "rig.toml").write_text(rig.toml(*off))
+    study = study_record(read_record(tmp_path / "waves.csv"), load_rig(tmp_path / "rig.toml"))
+    fit = study.fit
+    for factor, told, given in zip(fit.factors, (fit.stiffness, fit.inertia), off, strict=True):
+        assert factor * given == pytest.approx(1.0, abs=0.03)
+        assert told.low / told.value <= 1.0 / (factor * given) <= told.high / told.value
+    assert fit.damping.low < rig.damping < fit.damping.high
+    known = np.isfinite(study.bit.speed)
+    true = np.interp(study.bit.time, time, bit) * np.pi / 30.0
+    left = study.bit.speed[known] - true[known]
+    assert np.sqrt(np.mean(left**2) / np.mean(true[known] ** 2)) < 0.1
 
 
 def test_the_bits_torque_is_that_of_the_record():

@@ -211,7 +211,7 @@ def test_ten_thousand_hostile_samples_stay_within_the_limit(laws, tmp_path, tool
             python.step(*sample, on, **given)
             limit = given.get("limit", LIMIT)
             assert abs(u) <= min(LIMIT, max(limit, 0.0) if limit < LIMIT else LIMIT)
-            if np.isnan(sample).any():
+            if np.isnan([*sample[:3], *listed(sample[3])]).any():
                 assert steps.status & (2 | 4)
         # A drive on endless pipe, from where the last sample found it.
         speed, u = 12.0, 0.0
@@ -226,10 +226,11 @@ def test_the_source_is_clean_under_sanitizers_and_cppcheck(laws, tmp_path, tool)
     tool("cppcheck")
     for law in laws.values():
         export_drive(law, tmp_path / "drive.c")
+        places = "".join(f" {values[0]!r} + (k * 4.0)," for _, values in law.axes)
         main = (
             '#include "drive.h"\nint main(void) { drive_state s; double u = 0.0; int k;'
             " drive_init(&s); for (k = 0; k < 900; k++) { u = drive_step(&s, (k % 7) * 3.0,"
-            " 12.0, u, k * 4.0, (k % 90) < 80); } return (u > 1e9) ? 1 : 0; }\n"
+            f" 12.0, u,{places} (k % 90) < 80); }} return (u > 1e9) ? 1 : 0; }}\n"
         )
         (tmp_path / "main.c").write_text(main)
         for compiler in ("gcc", "clang"):
@@ -516,9 +517,14 @@ def test_the_command_writes_laws_over_depth_and_at_one(tmp_path, capsys):
     status, told, _ = call(*given)
     assert status == 0
     assert "m: Kp" not in (tmp_path / "drive.h").read_text()
+    assert call(*given, "--real", "float")[0] == 0
+    assert "float, which changes the torque" in (tmp_path / "drive.h").read_text()
     for bad, option in (
         (given[:4], "--limit"), (("--out", out, *given[4:]), "--period"),
-        ((*given, "--real", "float"), "--real"), (("--period", "10 ms"), "--period"),
+        ((*given, "--real", "half"), "--real"),
+        (("--structure", "z-torque", "--real", "float", *given[:2], "--period", "5 ms", *given[4:]),
+         "--real"),
+        (("--period", "10 ms"), "--period"),
         ((*given, "--fmi", "2.0"), "--fmi"), ((*given, "--smooth", "5"), "--smooth"),
         (("--structure", "z-torque", "--out", out, "--period", "20 ms", *given[4:]), "--period"),
         (("--out", str(tmp_path / "Enable.st"), *given[2:]), "--out"),
