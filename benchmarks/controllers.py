@@ -1,8 +1,8 @@
 """A million samples through exported controllers, compiled, against the law in Python.
 
 Tables of gains at random (interpolated, constant and unsafe cells, three and four axes), and laws
-of a top drive. One sample in a hundred is broken. Run as ``python -m benchmarks.controllers
-[COUNT]``; a C compiler has to be there.
+of a top drive of every kind, the last of them as a unit in fmpy too. One sample in a hundred is
+broken. Run as ``python -m benchmarks.controllers [COUNT]``; a C compiler has to be there.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from drillctrl import (
     drive_control,
     export_drive,
     linear_axis,
+    pi_control,
     preset_structure,
     sampled_drive,
     string_preset,
@@ -81,6 +82,50 @@ def in_c(folder, step, y, at, delay, on):
     return arrays[4], arrays[5], time.perf_counter() - began
 
 
+def drives():
+    """Laws of every kind, one of them over speed, depth and rock."""
+    rig = string_preset("vertical-3000")
+    kinds = ("stiff", "soft-torque", "z-torque", "observer-1", "dynamic-1", "dynamic-4")
+    given = {"period": 5e-3, "limit": 40e3, "rate_limit": 1e6}
+    found = {kind: sampled_drive(drive_control(kind, rig), **given) for kind in kinds}
+    axes = {
+        "rotary_speed": (6.0, 9.0, 15.0),
+        "depth": (2000.0, 3000.0),
+        "rock_strength": (4e7, 9e7),
+    }
+    laws = [pi_control(rig.drive, 1e3 + 50.0 * i, 500.0 + 20.0 * i) for i in range(12)]
+    return {**found, "PI over speed, depth and rock": sampled_drive(laws, axes=axes, **given)}
+
+
+def in_fmpy(folder, law, y, on):
+    """Run the unit in fmpy, step by step."""
+    import fmpy
+    from fmpy.fmi3 import FMU3Slave
+
+    path = export_drive(law, folder / "unit.fmu")
+    description = fmpy.read_model_description(path)
+    place = {v.name: v.valueReference for v in description.modelVariables}
+    unit = FMU3Slave(
+        guid=description.guid, unzipDirectory=fmpy.extract(path, folder / "unit"),
+        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="unit",
+    )  # fmt: skip
+    unit.instantiate()
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    inputs = [place[n] for n in ("speed", "set_point", "torque", *(name for name, _ in law.axes))]
+    u, status = np.zeros(len(on)), np.zeros(len(on), dtype=np.int32)
+    began = time.perf_counter()
+    for i, row in enumerate(y.tolist()):
+        unit.setFloat64(inputs, row)
+        unit.setBoolean([place["enable"]], [bool(on[i])])
+        unit.doStep(i * law.period, law.period)
+        u[i], status[i] = unit.getFloat64([place["u"]])[0], unit.getInt32([place["status"]])[0]
+    seconds = time.perf_counter() - began
+    unit.terminate()
+    unit.freeInstance()
+    return u, status, seconds
+
+
 def told(name, found, expected, states):
     u, status, seconds = found
     apart = np.abs(u - np.array(expected)).max()
@@ -118,21 +163,23 @@ def main() -> None:
                 expected.append(steps.step(*row))
                 states.append(steps.status)
             told(f"{structure}, {' x '.join(map(str, sizes))} nodes", found, expected, states)
-        for kind in ("soft-torque", "z-torque"):
-            control = drive_control(kind, string_preset("vertical-3000"))
-            sampled = sampled_drive(control, period=5e-3, limit=40e3, rate_limit=1e6)
+        for name, sampled in drives().items():
             speed = 12.0 + 3.0 * np.sin(0.01 * np.arange(count)) + 0.01 * rng.normal(size=count)
             speed[broken] = np.nan
-            y = np.column_stack([speed, np.full(count, 12.0), np.full(count, 5e3)])
+            low, high = (np.array([v[end] for _, v in sampled.axes]) for end in (0, -1))
+            sway = np.sin(np.outer(np.arange(count), 1e-3 * np.arange(1, 1 + low.size)))
+            at = (low + high) / 2 + 0.55 * (high - low) * sway
+            y = np.column_stack([speed, np.full(count, 12.0), np.full(count, 5e3), at])
             export_drive(sampled, folder / "run.c")
-            step = "y[3 * i], y[(3 * i) + 1], y[(3 * i) + 2], delay[i], on[i]"
-            found = in_c(folder, step, y, y, np.full(count, 3000.0), on)
+            inputs = ", ".join(f"y[({y.shape[1]} * i) + {k}]" for k in range(y.shape[1]))
+            found = in_c(folder, f"{inputs}, on[i]", y, y, at[:, 0], on)
             steps = SteppedDrive(sampled)
             expected, states = [], []
             for row, switch in zip(y.tolist(), on.tolist(), strict=True):
-                expected.append(steps.step(*row, 3000.0, switch))
+                expected.append(steps.step(*row[:3], row[3:], switch))
                 states.append(steps.status)
-            told(kind, found, expected, states)
+            told(name, found, expected, states)
+        told("the last one as a unit in fmpy", in_fmpy(folder, sampled, y, on), expected, states)
 
 
 if __name__ == "__main__":

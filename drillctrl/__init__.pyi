@@ -28,6 +28,9 @@ from .designs.design import design as design
 from .designs.drilling import Drilling as Drilling
 from .designs.drive_design import DriveDesign as DriveDesign
 from .designs.drive_design import design_drive as design_drive
+from .designs.drive_trials import DriveTrials as DriveTrials
+from .designs.drive_trials import best_tried as best_tried
+from .designs.drive_trials import drive_trials as drive_trials
 from .designs.loop_analysis import LoopAnalysis as LoopAnalysis
 from .designs.loop_analysis import analyze_loop as analyze_loop
 from .designs.loops import spectral_abscissas as spectral_abscissas
@@ -110,6 +113,7 @@ from .motion.torsion import TorsionalMode as TorsionalMode
 from .motion.torsion import torsional_modes as torsional_modes
 from .paper.agreement import Agreement as Agreement
 from .paper.reproduce import reproduce as reproduce
+from .records.computed import with_computed_map as with_computed_map
 from .records.downhole import Downhole as Downhole
 from .records.downhole import bit_from_surface as bit_from_surface
 from .records.example import example_path as example_path
@@ -194,6 +198,7 @@ from .strings.drive_sampled_loop import sampled_slopes as sampled_slopes
 from .strings.drive_stepped import SteppedDrive as SteppedDrive
 from .strings.drive_table import DriveTable as DriveTable
 from .strings.drive_table import drive_table as drive_table
+from .strings.drive_tuned import tuned_z_torque as tuned_z_torque
 from .strings.drives import DriveComparison as DriveComparison
 from .strings.drives import compare_drives as compare_drives
 from .strings.drives import drive_control as drive_control

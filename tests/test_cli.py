@@ -322,7 +322,7 @@ def test_simulate_a_controller_as_it_runs_on_a_rig(capsys, tmp_path):
         capsys, "simulate", "--rig", "table1", "--speed", "270 rpm", "--rop", "45 m/h",
         "--duration", "4 s",
     )[1]  # fmt: skip
-    assert "= 4 s, done" in text
+    assert "nonlinear model, 4 s, done" in text
     assert "rpm" in text
 
 

@@ -156,8 +156,13 @@ def source_digest(package: Path = Path(__file__).parents[1]) -> str:
     return digest.hexdigest()
 
 
+def computed_by() -> str:
+    """Return a hash of sources and libraries."""
+    return hashlib.sha256(f"{source_digest()} {_own()}".encode()).hexdigest()[:16]
+
+
 def _header() -> bytes:
-    origin = hashlib.sha256(f"{source_digest()} {_own()}".encode()).hexdigest()[:16]
+    origin = computed_by()
     return json.dumps({"drillctrl checkpoint": origin}).encode("ascii") + b"\n"
 
 

@@ -388,6 +388,8 @@ def _crossings(
     at: FloatArray | None = None,
 ) -> tuple[FloatArray, np.ndarray]:
     """Return t and the change of the count (±2 for a pair) at each crossing."""
+    if not rows.size:
+        return np.zeros(0), np.zeros(0, dtype=np.int64)
     a, slope_a, b, slope_b = loops.take(rows).values_and_slopes(omega, line)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = -(a * b.conj()).real / np.abs(b) ** 2 if at is None else at

@@ -101,8 +101,10 @@ class StabilityChart:
         name = plane.name or "open loop"
         lines = [
             f"Stability chart of {name}",
-            f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
-            f"{plane.y.label} in [{plane.y.low:g}, {plane.y.high:g}]",
+            *(
+                f"  {word:<9} {axis.label} in [{axis.low:g}, {axis.high:g}]"
+                for word, axis in (("over", plane.x), ("and", plane.y))
+            ),
             f"  stable    {area_text(self.stable_area, self.area_error, plane)}",
         ]
         if self.level:
@@ -123,7 +125,8 @@ class StabilityChart:
         checked = [region for region in self.regions if region.confirmed is not None]
         agree = sum(bool(region.confirmed) for region in checked)
         lines.append(
-            f"  checked   the argument principle agrees in {agree} of {len(checked)} regions"
+            f"  checked   a count of roots without knowing them agrees in {agree} of "
+            f"{len(checked)} regions"
         )
         return "\n".join(lines)
 

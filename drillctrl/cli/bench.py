@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_figure,
+    check_folder,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.scenario import (
     SURROUNDING_OPTIONS,
@@ -121,7 +128,7 @@ def bench_command(
         writing("--out", out, lambda: run.recording.save(out))
     if plot is not None:
         write_figure(plot, run.plot())
-    click.echo(json_text(run.to_dict()) if as_json else run.summary())
+    click.echo(json_text(run.to_dict()) if as_json else plain(run.summary()))
 
 
 def _benched(answer: str | None, options: dict[str, Any], line: dict[str, Any]) -> BenchRun:

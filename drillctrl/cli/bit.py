@@ -59,6 +59,12 @@ from drillctrl.cli.verb import Verb
     type=click.Choice(["speed", "rate"]),
     help="Over rotary speed or rate of penetration instead, half to twice the point's.",
 )
+@click.option(
+    "--keep",
+    type=click.Path(file_okay=False),
+    metavar="FOLDER",
+    help="Keep answers here by what computed them, and take them from here.",
+)
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option("--out", type=click.Path(), help="Also write the JSON to FILE.json.")
@@ -72,6 +78,7 @@ def bit_command(
     imposed: bool,
     band: bool,
     along: str | None,
+    keep: str | None,
     workers: int,
     as_json: bool,
     out: str | None,
@@ -107,7 +114,8 @@ def bit_command(
     if band and along is not None:
         raise InputError("--along", along, "left out with --band")
     # What is left to the function that looks has a default of its own there.
-    patience: dict[str, Any] = {} if most_periods is None else {"most_periods": most_periods}
+    given = {"most_periods": most_periods, "keep": keep}
+    patience: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if along is not None:
         if imposed:
             raise InputError("--imposed", "given", "left out with --along")

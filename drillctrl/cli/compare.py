@@ -11,7 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.extras import required
 from drillctrl.cli.drives import are_drives, deliver_drives, drive_options, refuse_drive_options
 from drillctrl.cli.gains import read_bounds, read_gains, scales_at
-from drillctrl.cli.output import check_folder, json_text, writing
+from drillctrl.cli.output import check_folder, json_text, plain, writing
 from drillctrl.cli.point import point_options, read_point
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.roots import trials_option, wants_trials
@@ -66,8 +66,10 @@ def compare_command(
     """Compare feedback structures and given gains at one point on one set of measures.
 
     Structures of a top drive (stiff, soft-torque, soft-torque-matched, soft-torque-fastest,
-    z-torque, observer-1 … observer-3, dynamic-1 … dynamic-4) are compared on the string of a
-    rig: reflection, critical slope and threshold speed of each mode, margin of the delay.
+    z-torque, z-torque-tuned, observer-1 … observer-3, dynamic-1 … dynamic-4) are compared on
+    the string of a rig: reflection, critical slope and threshold speed of each mode, margin of
+    the delay; with --speed and --rop they are also run there, beside a stiff drive, and the best
+    is named.
 
     \b
     Examples:
@@ -80,7 +82,7 @@ def compare_command(
     names = [name for name in (part.strip() for part in structures.split(",")) if name]
     for_drives = {"plot": plot, "drop": drop, "decay": decay}
     if are_drives(names):
-        deliver_drives(names, point, for_drives, as_json, out)
+        deliver_drives(names, point, for_drives, as_json, out, wants_trials(trials))
         return
     refuse_drive_options(for_drives)
     if out is not None and Path(out).suffix.lower() not in ENDINGS:
@@ -113,7 +115,7 @@ def compare_command(
         )
     if out is not None:
         _write(result, out)
-    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+    click.echo(json_text(result.to_dict()) if as_json else plain(result.summary()))
 
 
 def read_given(text: str, where: OperatingPoint | RigPoint) -> Given:

@@ -34,8 +34,8 @@ from drillctrl.cli.verb import Verb
     default="case1",
     show_default=True,
     help="p: θ; case1: θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed; of a top "
-    "drive: stiff, soft-torque, z-torque, observer-2 by their rules, dynamic-1 … dynamic-4 "
-    "optimised.",
+    "drive: stiff, soft-torque, z-torque, observer-2 by their rules, z-torque-tuned and "
+    "dynamic-1 … dynamic-4 optimised.",
 )
 @click.option(
     "--bound",
@@ -83,7 +83,8 @@ def design_command(
     """
     check_outputs(out, plot)
     if are_drives([structure]):
-        stable = deliver_drive_design(structure, options, as_json, out, plot)
+        tried = wants_trials(trials)
+        stable = deliver_drive_design(structure, options, as_json, out, plot, tried, workers)
         if require_stable and not stable:
             raise click.exceptions.Exit(NOT_STABILISED)
         return

@@ -11,7 +11,14 @@ import click
 from click.core import ParameterSource
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_figure, deliver, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_figure,
+    deliver,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.point import read_point, rig_name
 
 if TYPE_CHECKING:
@@ -22,10 +29,11 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 ENDINGS = (".csv", ".json")
 _ALONE = ("plot", "drop", "decay")
-_BEARS = ("rig", "units", "structures", "as_json", "out", *_ALONE)
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
-_TABLE_BEARS = ("rig", "depth", "structure", "require_stable", "as_json", "out", "plot")
-_DESIGN_BEARS = (*_POINT, "units", "structure", "require_stable", "as_json", "out", "plot")
+_BEARS = (*_POINT, "trials", "units", "structures", "as_json", "out", *_ALONE)
+_TABLE_BEARS = ("rig", "units", "depth", "structure", "require_stable", "as_json", "out", "plot")
+_RUNS = ("trials", "workers")
+_DESIGN_BEARS = (*_POINT, *_RUNS, "units", "structure", "require_stable", "as_json", "out", "plot")
 
 
 def drive_options(command: Command) -> Command:
@@ -74,9 +82,7 @@ def _check_options() -> None:
         if not typed or name in _BEARS:
             continue
         option, value = parameter.opts[0], context.params[name]
-        if name not in ("speed", "rop", "wob"):
-            raise InputError(option, value, "left out for drives: the string alone decides")
-        click.echo(f"drillctrl: note: {option} does not bear on drives", err=True)
+        raise InputError(option, value, "left out for drives")
 
 
 def deliver_drive_design(
@@ -85,6 +91,8 @@ def deliver_drive_design(
     as_json: bool,
     out: str | None,
     plot: str | None,
+    trials: bool,
+    workers: int,
 ) -> bool:
     """Find the law of a top drive, print, and write the files asked for.
 
@@ -108,12 +116,18 @@ def deliver_drive_design(
     drills = any(point.get(name) is not None for name in _POINT[1:])
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
     error = point.get("depth_error")
-    found = design_drive(where, structure, length_error=0.2 if error is None else error)
+    found = design_drive(
+        where,
+        structure,
+        length_error=0.2 if error is None else error,
+        trials=drills and trials,
+        workers=workers,
+    )
     units = point.get("units") or "si"
     text = functools.partial(found.summary, units)
     draw = functools.partial(found.plot, rig_name(point))
     deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
-    return found.stable and found.drive.verdict.recommended
+    return found.stable and found.recommended
 
 
 def _refuse_others(structure: str, bears: Sequence[str]) -> None:
@@ -128,7 +142,12 @@ def _refuse_others(structure: str, bears: Sequence[str]) -> None:
 
 
 def deliver_drive_table(
-    structure: str, options: Mapping[str, Any], as_json: bool, out: str | None, plot: str | None
+    structure: str,
+    options: Mapping[str, Any],
+    as_json: bool,
+    out: str | None,
+    plot: str | None,
+    units: str | None = None,
 ) -> bool:
     """Find the law of a top drive at each depth, print, and write the files asked for.
 
@@ -169,8 +188,8 @@ def deliver_drive_table(
     else:
         _write(found, out)
     if plot is not None:
-        write_figure(plot, found.plot())
-    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+        write_figure(plot, found.plot(units))
+    click.echo(json_text(found.to_dict()) if as_json else plain(found.summary(units)))
     return found.stable and found.harm is None
 
 
@@ -190,6 +209,7 @@ def deliver_drives(
     given: Mapping[str, Any],
     as_json: bool,
     out: str | None,
+    trials: bool,
 ) -> None:
     """Compare drives, print, and write the files asked for.
 
@@ -198,13 +218,16 @@ def deliver_drives(
     names : sequence of str
         Laws.
     point : mapping
-        Options that say where the rig drills; drives need ``rig`` alone.
+        Options that say where the rig drills; drives need ``rig`` alone, and are tried where there
+        is more.
     given : mapping
         ``plot``, ``drop`` and ``decay``.
     as_json : bool
         Whether to print JSON.
     out : str or None
         File for the numbers.
+    trials : bool
+        Whether laws are run where the rig drills.
 
     Raises
     ------
@@ -226,8 +249,20 @@ def deliver_drives(
     for name, dimension in (("drop", units.TORQUE), ("decay", units.ROTARY_SPEED)):
         if given[name] is not None:
             falling[name] = units.to_si(f"--{name}", given[name], dimension)
-    found = compare_drives(load_rig(point["rig"]), names, FallingTorque(**falling))
+    drills = any(point.get(name) is not None for name in _POINT[1:])
+    where: Any = read_point(dict(point)) if drills else None
+    rig = where.rig if drills else load_rig(point["rig"])
+    found = compare_drives(rig, names, FallingTorque(**falling))
+    fields, text = found.to_dict(), found.summary(point.get("units") or "si")
+    if drills and trials:
+        from drillctrl.designs.drive_trials import best_tried, drive_trials, trials_text
+        from drillctrl.drilling.case import as_case
+
+        tried = drive_trials(where, found.drives)
+        fields["trials"] = [each.to_dict() for each in tried]
+        fields["best"] = best_tried(tried).drive.control.name
+        text += f"\n\n{trials_text(tried, as_case(where).place)}"
     _write(found, out)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot(rig_name(point)))
-    click.echo(json_text(found.to_dict()) if as_json else found.summary(point.get("units") or "si"))
+    click.echo(json_text(fields) if as_json else plain(text))

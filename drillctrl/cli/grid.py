@@ -34,6 +34,7 @@ def grid_options(command: Command) -> Command:
         click.option("--damping", type=float, help="Sets ξ and κ together."),
         click.option("--blades", type=float, help="Number of blades n (default 4)."),
         click.option("--rig", help="Preset (table1) or TOML file, instead of the above."),
+        click.option("--units", metavar="NAME", help="Results of a rig in si or field units."),
         click.option("--speed", metavar=with_unit, help="Such as '90:180:10 rpm'."),
         click.option("--rop", metavar=with_unit, help="Such as '5:30:6 m/h'."),
         click.option("--wob", metavar=with_unit, help="Instead of --rop: '20:80:7 kN'."),
@@ -51,6 +52,25 @@ def grid_options(command: Command) -> Command:
         click.option("--mud", metavar=with_unit, help="Its mud, such as '9:13:3 ppg'."),
     ]
     return with_options(command, options)  # fmt: skip
+
+
+def checked_units(options: dict[str, Any], read: bool) -> str | None:
+    """Return in which units a table is told, taken off the options.
+
+    Raises
+    ------
+    InputError
+        If there are none of that name, or nothing has units.
+    """
+    from drillctrl.base.language import told_language
+
+    units: str | None = options.pop("units")
+    if units is not None:
+        if not read and options.get("rig") is None:
+            raise InputError("--units", units, "left out without --rig")
+        with naming("--units", "units"):
+            told_language(units)
+    return units
 
 
 def read_grid(options: dict[str, Any]) -> Grid:

@@ -12,7 +12,14 @@ from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.cli.axes import read_counted_axis, with_axes
 from drillctrl.cli.drive_law import drive_law, driven_place
 from drillctrl.cli.drives import are_drives
-from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_figure,
+    check_folder,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.scenario import (
@@ -214,7 +221,7 @@ def map_command(
         _finish(checkpoint)
     if plot is not None:
         write_figure(plot, result.plot(shown, rig_name(options), difference))
-    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+    click.echo(json_text(result.to_dict()) if as_json else plain(result.summary()))
 
 
 def _check_weight(options: dict[str, Any], *axes: str) -> None:
@@ -279,8 +286,8 @@ def _read_controller(
         if options[name] is not None:
             option = {"k1": "--K1", "k2": "--K2"}.get(name, "--structure")
             raise InputError(option, options[name], "left out where --table gives the gains")
-    for name, plain in (("activation", None), ("noise", ""), ("delay", "fixed")):
-        if options[name] != plain:
+    for name, usual in (("activation", None), ("noise", ""), ("delay", "fixed")):
+        if options[name] != usual:
             raise InputError(f"--{name}", options[name], "left out with --table on a map")
     from drillctrl.drilling.case import as_case
     from drillctrl.tables.files import load_table

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from drillctrl.cli.output import json_text, write_figure, writing
+from drillctrl.cli.output import json_text, plain, write_figure, writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,7 +87,7 @@ def deliver_run(
     if as_json:
         click.echo(json_text(simulation_fields(run, multipliers)))
     else:
-        click.echo(simulation_summary(run, multipliers))
+        click.echo(plain(simulation_summary(run, multipliers)))
     if interrupted:
         raise click.exceptions.Exit(_INTERRUPTED)
     return figures(run).outcome.calm
@@ -121,7 +121,7 @@ def deliver_starts(made: Iterator[StartRun], count: int, wanted: Wanted, as_json
     if as_json:
         click.echo(json_text({**simulation_fields(worst), **found.to_dict()}))
     else:
-        click.echo(f"{starts_summary(found)}\n\n{simulation_summary(worst)}")
+        click.echo(plain(f"{starts_summary(found)}\n\n{simulation_summary(worst)}"))
     if interrupted:
         raise click.exceptions.Exit(_INTERRUPTED)
     return found.calm

@@ -19,6 +19,25 @@ if TYPE_CHECKING:
 
 # Where the context of a command keeps how figures look.
 STYLE = "drillctrl.style"
+# Whether theory is told for a rig too, and the labels of what that is.
+VERBOSE = "drillctrl.verbose"
+_THEORY = ("Point", "Dimensionless", "Result", "Dominant roots", "Checked by", "Optimal by",
+           "Minimised", "Multipliers", "Effort")  # fmt: skip
+
+
+def plain(text: str) -> str:
+    """Return a summary as people on a rig want it, without theory unless they ask for that."""
+    context = click.get_current_context()
+    units = context.params.get("units")
+    if context.meta.get(VERBOSE) or not context.params.get("rig") or units == "dimensionless":
+        return text
+    kept, theory = [], False
+    for line in text.splitlines():
+        if not line.startswith("  "):
+            theory = line.startswith(tuple(f"{label}  " for label in _THEORY))
+        if not theory:
+            kept.append(line)
+    return "\n".join(kept)
 
 
 def json_text(fields: dict[str, Any]) -> str:
@@ -106,4 +125,4 @@ def deliver(
         write_json(out, fields)
     if plot is not None:
         write_figure(plot, draw())
-    click.echo(json_text(fields) if as_json else text())
+    click.echo(json_text(fields) if as_json else plain(text()))

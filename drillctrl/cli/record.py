@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.cli.output import (
     check_figure,
     check_folder,
     json_text,
+    plain,
     write_figure,
     write_json,
     writing,
@@ -23,6 +25,22 @@ if TYPE_CHECKING:
     from drillctrl.records.study import RecordStudy
 
 _ENDINGS = (".json", ".html", ".csv")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A recording and how it is looked at, as typed."""
+
+    file: str
+    columns: tuple[str, ...]
+    dates: str | None
+    rig: str | None
+    torque_of: str | None
+    drive_inertia: str | None
+    lag: str | None
+    begin: str | None
+    end: str | None
+    no_fit: bool
 
 
 @click.command(name="record", cls=Verb)
@@ -42,6 +60,11 @@ _ENDINGS = (".json", ".html", ".csv")
 @click.option("--from", "begin", metavar="TIME", help="Look from here, such as '60 s'.")
 @click.option("--to", "end", metavar="TIME", help="Look up to here.")
 @click.option("--no-fit", is_flag=True, help="Fit no string.")
+@click.option(
+    "--map", "grid", metavar="COUNTxCOUNT", help="Simulate over speed and weight too: '5x4'."
+)
+@click.option("--structure", help="With --map: law of the top drive (its speed held).")
+@click.option("--workers", type=int, default=1, help="With --map: processes.")
 @click.option("--fit", "fitted", type=click.Path(), help="Write the fitted rig: FILE.toml.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 @click.option(
@@ -50,19 +73,14 @@ _ENDINGS = (".json", ".html", ".csv")
 @click.option("--plot", type=click.Path(), help="Draw what it shows: FILE.png, .svg, .pdf.")
 def record_command(
     file: str,
-    columns: tuple[str, ...],
-    dates: str | None,
-    rig: str | None,
-    torque_of: str | None,
-    drive_inertia: str | None,
-    lag: str | None,
-    begin: str | None,
-    end: str | None,
-    no_fit: bool,
     fitted: str | None,
+    grid: str | None,
+    structure: str | None,
+    workers: int,
     as_json: bool,
     out: str | None,
     plot: str | None,
+    **options: Any,
 ) -> None:
     """Say what a rig's recording shows, and fit the string to it.
 
@@ -74,63 +92,95 @@ def record_command(
     Examples:
       drillctrl record example
       drillctrl record example --rig example --to "300 s" --json
+
+    --map takes seconds for a run: the fitted string and law of the bit over the speeds and weights
+    that were drilled with, beside what was drilled. It needs weight on bit, and --rig.
     """
     check_folder("--out", out)
     if out is not None and Path(out).suffix.lower() not in _ENDINGS:
         raise InputError("--out", out, f"a file that ends in {', '.join(_ENDINGS)}")
     check_figure(plot)
     check_folder("--fit", fitted)
-    if fitted is not None and (rig is None or Path(fitted).suffix.lower() != ".toml" or no_fit):
+    asked = _Asked(file, **options)
+    if fitted is not None and (
+        asked.rig is None or Path(fitted).suffix.lower() != ".toml" or asked.no_fit
+    ):
         raise InputError("--fit", fitted, "a file that ends in .toml, with --rig, not --no-fit")
     if out is not None and Path(out).suffix.lower() == ".html":
         from drillctrl.base.extras import required
 
         required("matplotlib", "figures")
-    study = _study(file, columns, dates, rig, torque_of, drive_inertia, lag, begin, end, no_fit)
+    counts = _counts(grid, asked.rig, structure)
+    study = _study(asked)
+    if counts is not None:
+        study = _mapped(study, _rig(asked.rig), counts, structure, workers)
     if fitted is not None:
-        _write_fit(study, _rig(rig), fitted)
+        _write_fit(study, _rig(asked.rig), fitted)
     if out is not None:
         _write(study, out)
     if plot is not None:
         write_figure(plot, study.plot())
-    click.echo(json_text(study.to_dict()) if as_json else study.summary())
+    click.echo(json_text(study.to_dict()) if as_json else plain(study.summary()))
 
 
-def _study(
-    file: str,
-    columns: tuple[str, ...],
-    dates: str | None,
-    rig: str | None,
-    torque_of: str | None,
-    drive_inertia: str | None,
-    lag: str | None,
-    begin: str | None,
-    end: str | None,
-    no_fit: bool,
-) -> RecordStudy:
+def _study(asked: _Asked) -> RecordStudy:
     from drillctrl.base import units
     from drillctrl.records.example import example_path
     from drillctrl.records.record import read_record
     from drillctrl.records.study import study_record
 
-    def seconds(option: str, text: str | None) -> float | None:
-        return None if text is None else units.to_si(option, text, units.TIME)
+    def si(option: str, text: str | None, dimension: units.Dimension) -> float | None:
+        return None if text is None else units.to_si(option, text, dimension)
 
     late, first, last = (
-        seconds(option, text) for option, text in (("--lag", lag), ("--from", begin), ("--to", end))
+        si(option, text, units.TIME)
+        for option, text in (("--lag", asked.lag), ("--from", asked.begin), ("--to", asked.end))
     )
-    inertia = None
-    if drive_inertia is not None:
-        inertia = units.to_si("--drive-inertia", drive_inertia, units.INERTIA)
-    known = None if rig is None else _rig(rig)
-    source = example_path("record") if file == "example" else file
-    record = read_record(source, columns, dates=dates)
+    inertia = si("--drive-inertia", asked.drive_inertia, units.INERTIA)
+    known = None if asked.rig is None else _rig(asked.rig)
+    source = example_path("record") if asked.file == "example" else asked.file
+    record = read_record(source, asked.columns, dates=asked.dates)
     if first is not None or last is not None:
-        stop = record.duration if last is None else last
-        record = record.part(first or 0.0, stop)
+        record = record.part(first or 0.0, record.duration if last is None else last)
     return study_record(
-        record, known, torque_of=torque_of, own_inertia=inertia, lag=late, fit=not no_fit
+        record,
+        known,
+        torque_of=asked.torque_of,
+        own_inertia=inertia,
+        lag=late,
+        fit=not asked.no_fit,
     )
+
+
+def _counts(grid: str | None, rig: str | None, structure: str | None) -> tuple[int, int] | None:
+    if grid is None:
+        if structure is not None:
+            raise InputError("--structure", structure, "left out, or given with --map")
+        return None
+    parts = grid.lower().split("x")
+    if len(parts) != 2 or not all(p.isdecimal() and 2 <= int(p) <= 40 for p in parts):
+        raise InputError("--map", grid, "such as 5x4: 2 to 40 speeds and weights")
+    if rig is None:
+        raise InputError("--map", grid, "given with --rig: what is simulated")
+    return int(parts[0]), int(parts[1])
+
+
+def _mapped(
+    study: RecordStudy, rig: Rig, counts: tuple[int, int], structure: str | None, workers: int
+) -> RecordStudy:
+    from drillctrl.base.workers import open_executor
+    from drillctrl.cli.progress import open_progress
+    from drillctrl.records.computed import with_computed_map
+
+    checked_integer("--workers", workers, 1, 1024)
+    with (
+        open_executor(workers, None) as executor,
+        open_progress() as progress,
+        naming("--map", "counts", "weight_on_bit"),
+    ):
+        return with_computed_map(
+            study, rig, counts, structure=structure, executor=executor, progress=progress
+        )
 
 
 def _rig(source: str | None) -> Rig:

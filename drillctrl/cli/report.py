@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.output import check_folder, json_text, writing
+from drillctrl.cli.output import check_folder, json_text, plain, writing
 from drillctrl.cli.point import point_options, read_point, rig_name
 from drillctrl.cli.progress import open_progress, open_stages
 from drillctrl.cli.verb import Verb, naming
@@ -82,7 +82,7 @@ def report_command(
             stage=stage,
         )
     writing("--out", out, lambda: found.save(out))
-    click.echo(json_text(found.to_dict()) if as_json else found.summary())
+    click.echo(json_text(found.to_dict()) if as_json else plain(found.summary()))
 
 
 def _date(given: str | None) -> str:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import click
 
-from drillctrl.cli.output import check_ending, check_figure, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_ending,
+    check_figure,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.verb import Verb
 
 
@@ -53,4 +60,4 @@ def check_command(
         from drillctrl.strings.saving import save_rig
 
         writing("--out", out, lambda: save_rig(rig, out))
-    click.echo(json_text(found.to_dict()) if as_json else rig_summary(found, language))
+    click.echo(json_text(found.to_dict()) if as_json else plain(rig_summary(found, language)))

@@ -18,9 +18,16 @@ from drillctrl.cli.controller_file import (
 )
 from drillctrl.cli.drives import are_drives, deliver_drive_table
 from drillctrl.cli.gains import gain_scales, read_bounds
-from drillctrl.cli.grid import grid_options, read_grid
+from drillctrl.cli.grid import checked_units, grid_options, read_grid
 from drillctrl.cli.objective import objective_options, read_objective
-from drillctrl.cli.output import check_figure, check_folder, json_text, write_figure, writing
+from drillctrl.cli.output import (
+    check_figure,
+    check_folder,
+    json_text,
+    plain,
+    write_figure,
+    writing,
+)
 from drillctrl.cli.progress import open_progress
 from drillctrl.cli.roots import trials_option, wants_trials
 from drillctrl.cli.verb import Verb, naming
@@ -111,9 +118,13 @@ def table_command(
     """
     check_folder("--out", out)
     check_figure(plot)
+    units = checked_units(options, source is not None)
     structure = str(options["structure"])
     if source is None and are_drives([structure]):
-        if not deliver_drive_table(structure, options, as_json, out, plot) and require_stable:
+        if (
+            not deliver_drive_table(structure, options, as_json, out, plot, units)
+            and require_stable
+        ):
             raise click.exceptions.Exit(3)
         return
     controller = {name: options.pop(name) for name in CONTROLLER_NAMES}
@@ -133,8 +144,8 @@ def table_command(
     if checkpoint is not None:
         _finish(checkpoint)
     if plot is not None:
-        write_figure(plot, result.plot())
-    click.echo(json_text(result.to_dict()) if as_json else result.summary())
+        write_figure(plot, result.plot(units))
+    click.echo(json_text(result.to_dict()) if as_json else plain(result.summary(units)))
     if require_stable and not result.sound.all():
         raise click.exceptions.Exit(3)
 

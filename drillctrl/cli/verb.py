@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from drillctrl.base.errors import InputError, UndecidedError
-from drillctrl.cli.output import STYLE
+from drillctrl.cli.output import STYLE, VERBOSE
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -46,6 +46,16 @@ def _style_option() -> click.Option:
     )  # fmt: skip
 
 
+def _verbose_option() -> click.Option:
+    """Return what says whether theory is told for a rig."""
+
+    def keep(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+        ctx.meta[VERBOSE] = value
+
+    told = "Of a rig: symbols, roots and certificates too."
+    return click.Option(["--verbose"], is_flag=True, help=told, expose_value=False, callback=keep)
+
+
 class Verb(click.Command):
     """A command that turns the name of a parameter in a message into that of its option."""
 
@@ -54,6 +64,9 @@ class Verb(click.Command):
         drawing = [i for i, parameter in enumerate(self.params) if parameter.name == "plot"]
         if drawing:
             self.params.insert(drawing[0] + 1, _style_option())
+        names = [parameter.name for parameter in self.params]
+        if "rig" in names and "as_json" in names:
+            self.params.insert(names.index("as_json"), _verbose_option())
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""

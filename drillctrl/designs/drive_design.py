@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.text import wrapped
+from drillctrl.designs.drive_trials import DriveTrials, best_tried, drive_trials, trials_text
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
+from drillctrl.strings.drive_tuned import TUNED
 from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
 from drillctrl.strings.drives_words import law_text, refusal, setting_sentence
 from drillctrl.strings.falling import FallingTorque
@@ -39,6 +41,10 @@ class DriveDesign:
         The linear motion at the point, the bit in the rock; None without a point.
     modes : NamedRoots or None
         Its roots by the modes of the string.
+    asked : str
+        The law that was asked for; that of ``drive`` where another does better in trial runs.
+    trials : tuple of DriveTrials
+        What trial runs showed of the laws of ``found``; empty where none were made.
     elapsed_seconds : float
         Wall time.
     """
@@ -46,6 +52,8 @@ class DriveDesign:
     found: DriveComparison
     drilling: Analysis | None
     modes: NamedRoots | None
+    asked: str
+    trials: tuple[DriveTrials, ...]
     elapsed_seconds: float
 
     @property
@@ -57,6 +65,16 @@ class DriveDesign:
     def stable(self) -> bool:
         """Whether it is stable with a free bit, and at the point if there is one."""
         return self.drive.stable and (self.drilling is None or self.drilling.stable)
+
+    @property
+    def recommended(self) -> bool:
+        """Whether the law does its string no harm, and none in trial runs where these were made."""
+        return self.drive.verdict.recommended and not (self.trials and self.trials[0].verdict.harm)
+
+    @property
+    def reason(self) -> str:
+        """One sentence why."""
+        return self.trials[0].verdict.reason if self.trials else self.drive.verdict.reason()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -80,6 +98,10 @@ class DriveDesign:
             **fields,
             "stable_with_free_bit": self.drive.stable,
             "stable": self.stable,
+            "recommended": self.recommended,
+            "reason": self.reason,
+            "asked": self.asked,
+            "trials": [each.to_dict() for each in self.trials],
             "drilling": drilling,
             "elapsed_seconds": self.elapsed_seconds,
         }
@@ -87,10 +109,15 @@ class DriveDesign:
     def summary(self, units: str = "si") -> str:
         """Return a text for people, in the units of ``"si"`` or ``"field"``."""
         language = told_language(units)
-        good = self.drive.verdict.recommended
         first = setting_sentence(self.drive.control, language)
+        if not self.drive.verdict.recommended:
+            first = refusal(self.drive, language)
+        elif not self.recommended:
+            first = f"Refused: {self.drive.control.name}, {self.reason}."
+        elif self.asked != self.drive.control.name:
+            first += f" In trial runs it did better than {self.asked}."
         lines = [
-            wrapped(first if good else refusal(self.drive, language)),
+            wrapped(first),
             wrapped(f"Law in SI units: {law_text(self.drive.control)}"),
             "",
             self.found.summary(units),
@@ -100,6 +127,8 @@ class DriveDesign:
             lines += ["", f"At the point: {self._outcome(said)}"]
             if self.modes is not None:
                 lines += [f"  {text}" for _, text in self.modes.lines]
+        if self.trials and self.drilling is not None:
+            lines += ["", trials_text(self.trials, self.drilling.case.place)]
         return "\n".join(lines)
 
     def _outcome(self, said: Analysis) -> str:
@@ -124,6 +153,8 @@ def design_drive(
     falling: FallingTorque | None = None,
     *,
     length_error: float = 0.2,
+    trials: bool = False,
+    workers: int = 1,
 ) -> DriveDesign:
     """Find the law of a top drive, by the rule of its name or by optimisation.
 
@@ -139,6 +170,12 @@ def design_drive(
     length_error : float
         Share by which the string may be shorter and longer: what is optimised holds the
         smallest critical slope of all of these up.
+    trials : bool
+        At a point, whether laws are run from a small start and from kicks beside a stiff drive:
+        the one asked for and, beside an optimised one, ``"z-torque"`` by its rule and tuned. The
+        best of these is the answer.
+    workers : int
+        Processes that share the runs.
 
     Returns
     -------
@@ -154,7 +191,16 @@ def design_drive(
     rig = where.rig if isinstance(where, RigPoint) else where
     machine_of(rig)
     assert isinstance(rig, StringRig)
-    found = compare_drives(rig, [drive_control(structure, rig, length_error)], falling)
+    names = [structure]
+    if trials and isinstance(where, RigPoint) and structure.startswith("dynamic-"):
+        names += [TUNED, "z-torque"]
+    found = compare_drives(rig, [drive_control(name, rig, length_error) for name in names], falling)
+    tried: tuple[DriveTrials, ...] = ()
+    if trials and isinstance(where, RigPoint):
+        tried = drive_trials(where, found.drives, workers)
+        best = best_tried(tried)
+        tried = (best, *(each for each in tried if each is not best))
+        found = replace(found, drives=tuple(each.drive for each in tried))
     drilling = modes = None
     if isinstance(where, RigPoint):
         # Half of a second to load, and a law without a point has no use for it.
@@ -163,4 +209,4 @@ def design_drive(
         case = as_case(where, driven_plant(rig, found.drives[0].control))
         drilling = analyze(case)
         modes = named_roots(case, None, drilling.K1, drilling.K2)
-    return DriveDesign(found, drilling, modes, time.perf_counter() - began)
+    return DriveDesign(found, drilling, modes, structure, tried, time.perf_counter() - began)

@@ -14,7 +14,7 @@ from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
 from drillctrl.designs.result import Analysis, Design
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
-from drillctrl.designs.words import Lines, alpha_text, design_lines, result_lines
+from drillctrl.designs.words import Lines, decay_text, design_lines, rate_text, result_lines
 from drillctrl.drilling.gain_units import gain_texts
 from drillctrl.robustness.margins import ParameterMargin
 from drillctrl.strings.named_roots import NamedRoots, named_roots
@@ -26,6 +26,7 @@ _LEFT = 1e-3
 # States up to which margins of the point and a more robust alternative are looked for.
 _SOON = 20
 _GROUPS = {"psi": "ψ", "delta0": "δ0", "omega0": "ω0"}
+_OF_RIG = {"psi": "rock strength", "delta0": "depth of cut", "omega0": "rotary speed"}
 
 Progress = Callable[[str], None]
 
@@ -207,7 +208,7 @@ def _alternative_lines(found: Alternative) -> Lines:
     if other.trials:
         word = "recommended" if other.recommended else "REFUSED"
         lines.append(("", f"{word}: {other.reason}"))
-    text = f"α = {alpha_text(other.loop)}: at most {GIVE_UP:.0%} of the decay given up"
+    text = f"{decay_text(case, other.loop)}: at most {GIVE_UP:.0%} of the decay given up"
     return [*lines, ("", text), *_robustness_lines(other, found.robustness)]
 
 
@@ -240,6 +241,8 @@ def _remedy_lines(design: Design, found: tuple[Remedy, ...]) -> Lines:
     words = []
     for remedy in found:
         alpha = f"α = {remedy.spectral_abscissa:.4g}"
+        if (rig := design.case.told_rig) is not None:
+            alpha = rate_text(remedy.spectral_abscissa / rig.time_scale)
         if remedy.kind == "speed":
             faster = _speed_text(remedy.result)
             feedback = "no feedback" if remedy.result.structure is None else remedy.name
@@ -292,7 +295,11 @@ def _speed_text(design: Analysis) -> str:
 def _robustness_lines(result: Analysis, found: Robustness) -> Lines:
     """Say how near instability is, and what small errors do."""
     lines: Lines = []
-    off = found.fragility
+    off, rig = found.fragility, result.case.told_rig
+    groups, rock, delay, per = _GROUPS, "ψ 5 % lower or higher", "τ0", 1.0
+    if rig is not None:
+        groups, rock, delay = _OF_RIG, "rock 5 % softer or harder", "the delay"
+        per = rig.time_scale
     if result.stable:
         radius = found.stability_radius
         text = f"relative errors of the plant below {radius.lower_bound:.2g}"
@@ -303,14 +310,17 @@ def _robustness_lines(result: Analysis, found: Robustness) -> Lines:
     if (margin := found.delay_margin) is not None:
         longer = "any" if math.isinf(margin.limit) else f"{margin.limit:g} (or more)"
         longer = longer if math.isinf(margin.longer) else f"{margin.longer:.4g}"
-        lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times τ0"))
+        lines.append(("", f"delay between {margin.shorter:.4g} and {longer} times the assumed"))
     for name, errors in (found.point_margins or {}).items():
-        lines.append(("", f"{_GROUPS[name]} {_margin_text(errors)}"))
-    lines.append(("If off, α is", f"{off.rounded_gains:.4f} with the gains rounded to 3 digits"))
+        lines.append(("", f"{groups[name]} {_margin_text(errors)}"))
+    head = "If off, α is" if rig is None else "Growth, 1/s"
+    rounded = f"{off.rounded_gains / per:.4f} with the gains rounded to 3 digits"
+    lines.append((head, rounded))
     if off.psi_low is not None and off.psi_high is not None:
-        text = f"{off.psi_low:.4f} and {off.psi_high:.4f} with ψ 5 % lower or higher"
+        text = f"{off.psi_low / per:.4f} and {off.psi_high / per:.4f} with {rock}"
         lines.append(("", text))
     if off.delay_low is not None and off.delay_high is not None:
-        text = f"{off.delay_low:.4f} and {off.delay_high:.4f} with τ0 2 % shorter or longer"
+        text = f"{off.delay_low / per:.4f} and {off.delay_high / per:.4f} "
+        text += f"with {delay} 2 % shorter or longer"
         lines.append(("", text))
     return lines

@@ -8,6 +8,7 @@ from drillctrl.designs.drilling import ASKED, Drilling
 from drillctrl.designs.loop_analysis import LoopAnalysis
 from drillctrl.designs.values import AnalysisValues, DesignValues
 from drillctrl.designs.worst_case import WorstCase
+from drillctrl.drilling.case import Case
 from drillctrl.drilling.gain_units import gain_texts
 from drillctrl.drilling.steady import steady_state
 from drillctrl.simulation.outcome import Figures
@@ -18,6 +19,7 @@ Lines = list[tuple[str, str]]
 
 # Share of a growth rate from which on its error is shown.
 _SHOWN = 0.05
+_OF_RIG = {"theta": "its angle", "dtheta": "its speed", "x": "its place", "dx": "its rate"}
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
 _VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
 
@@ -37,7 +39,7 @@ def result_lines(result: AnalysisValues) -> Lines:
 def _answer_lines(result: AnalysisValues) -> Lines:
     """Say first, of a rig, what becomes of small vibration; of gains that were tried, runs say."""
     rig = result.case.told_rig
-    if rig is None or result.verdict.trials:
+    if rig is None or result.trials:
         return []
     rate = result.loop.spectral_abscissa / rig.time_scale
     hertz = abs(result.loop.dominant_roots[0].value.imag) / (2.0 * math.pi * rig.time_scale)
@@ -59,8 +61,11 @@ def design_lines(design: DesignValues) -> Lines:
     hits = f"{best.hits} descent(s) ended here, {best.basins} distinct end(s)"
     if best.next_best is not None:
         hits += f", next best {best.next_best:.4f}"
+    first, *rest = _opening(design)
     return [
-        *_opening(design),
+        first,
+        *_answer_lines(design),
+        *rest,
         *_motion_lines(design),
         *_loop_lines(design, word, _objective_lines(design)),
         ("Optimal by", text),
@@ -88,7 +93,7 @@ def _trial_lines(result: AnalysisValues) -> Lines:
         lines.append(("Trial runs" if trial is result.trials[0] else "", text))
     for mode in result.modes_worse:
         kind = mode.kind or "mixed"
-        before, after = _root_text(mode.open_loop), _root_text(mode.root)
+        before, after = (_root_text(s, result.case) for s in (mode.open_loop, mode.root))
         first = mode is result.modes_worse[0]
         lines.append(("Worse damped" if first else "", f"{kind} mode: {before} becomes {after}"))
     return lines
@@ -111,7 +116,10 @@ def _input_text(result: AnalysisValues, largest: float) -> str:
     return result.case.language.text("torque", largest * rig.torsional_stiffness, 3)
 
 
-def _root_text(s: complex) -> str:
+def _root_text(s: complex, case: Case) -> str:
+    if (rig := case.told_rig) is not None:
+        told = rate_text(s.real / rig.time_scale).removeprefix("vibration ")
+        return f"{told} at {abs(s.imag) / (2.0 * math.pi * rig.time_scale):.3g} Hz"
     return f"{s.real:.4g}" + (f" ± {s.imag:.4g}i" if s.imag else "")
 
 
@@ -140,8 +148,21 @@ def _point_lines(result: AnalysisValues) -> Lines:
     open_loop = result.open_loop
     state = "stable" if open_loop.stable else "unstable"
     if result.structure is not None:
-        lines.append(("Without control", f"{state}, α = {alpha_text(open_loop)}"))
+        lines.append(("Without control", f"{state}, {decay_text(result.case, open_loop)}"))
     return lines
+
+
+def decay_text(case: Case, loop: LoopAnalysis) -> str:
+    """Return how fast vibration dies away or grows, of a rig per second; else α."""
+    rig = case.told_rig
+    if rig is None:
+        return f"α = {alpha_text(loop)}"
+    return rate_text(loop.spectral_abscissa / rig.time_scale)
+
+
+def rate_text(rate: float) -> str:
+    """Return a growth rate in 1/s in words."""
+    return f"vibration {'grows' if rate > 0.0 else 'dies away'} by {abs(rate):.3g} 1/s"
 
 
 def alpha_text(loop: LoopAnalysis) -> str:
@@ -156,11 +177,13 @@ def _gain_lines(result: AnalysisValues) -> Lines:
     structure = result.structure
     if structure is None:
         return []
-    outputs = [_SIGNALS.get(name, name) for name in structure.outputs]
+    words = _SIGNALS if result.case.told_rig is None else _OF_RIG
+    outputs = [words.get(name, name) for name in structure.outputs]
     past = bool(structure.K2_lower.any() or structure.K2_upper.any())
-    law = f"u = K1·({', '.join(outputs)})" if len(outputs) > 1 else f"u = K1·{outputs[0]}"
+    law = "u" if words is _SIGNALS else "torque"
+    law += f" = K1·({', '.join(outputs)})" if len(outputs) > 1 else f" = K1·{outputs[0]}"
     if past:
-        law += " + K2·(the same, τ0 ago)"
+        law += f" + K2·(the same, {'τ0' if words is _SIGNALS else 'one delay'} ago)"
     refused = " (refused)" if result.verdict.refused else ""
     lines: Lines = [("Feedback", f"{structure.name}{refused}: {law}")]
     plant, rig, language = result.case.plant, result.case.told_rig, result.case.language
@@ -198,8 +221,7 @@ def _loop_lines(result: AnalysisValues, word: str, aims: Lines) -> Lines:
     if loop.stable:
         time = f"to 2 % in {loop.settling_time:.4g} time units"
         if (rig := result.case.told_rig) is not None:
-            seconds = loop.settling_time * rig.time_scale
-            time += f" = {seconds:.3g} s"
+            time = f"to 2 % in {loop.settling_time * rig.time_scale:.3g} s"
         lines.append(("Settling", time))
     check = loop.certificate
     word = "agrees" if check.agrees else "DOES NOT AGREE"

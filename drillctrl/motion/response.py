@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.shelf import Shelf
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.motion.record import Halves, halves, windowed
 from drillctrl.motion.turning import Led, Turned
@@ -96,6 +98,9 @@ class BitResponse:
         return float(np.abs(self.windows - self.value).max())
 
 
+_CLASSES: dict[str, type[Any]] = {each.__name__: each for each in (BitResponse, Status, Outcome)}
+
+
 def turned_case(where: Where, frequency: float, ripple: bool = False) -> Case:
     """Return the motion of a case under a rotation that swings at a frequency.
 
@@ -130,6 +135,7 @@ def bit_response(
     tolerance: float = TOLERANCE,
     most_periods: int = MOST_PERIODS,
     ripple: bool = False,
+    keep: str | Path | None = None,
     **options: Any,
 ) -> BitResponse:
     """Return the response H(iω, A) of a bit on its axial orbit.
@@ -154,6 +160,9 @@ def bit_response(
         Whether the speed is imposed at ω alone, so that the torque of the orbit makes it
         ripple at all other frequencies, as far as the torsional string lets it; else the
         rotation is imposed whole. With ripple A comes out a few per cent off what was asked.
+    keep : str or Path, optional
+        A folder in which responses are kept by what computed them: the plant, the point, these
+        arguments, the package's sources and its libraries. What is there is not computed again.
     **options
         ``cutting``, ``rtol`` and others of `simulate`.
 
@@ -174,6 +183,29 @@ def bit_response(
     most_periods = checked_integer("most_periods", most_periods, FEWEST_PERIODS, 1_000_000)
     case = turned_case(where, frequency, ripple)
     settling = settling_time(turned_case(where, frequency))
+
+    def measured() -> BitResponse:
+        return _measured(
+            case, settling, frequency, amplitude, tolerance, most_periods, ripple, options
+        )
+
+    if keep is None:
+        return measured()
+    plant, point = case.physics("the response of a bit")
+    asked = (frequency, amplitude, tolerance, most_periods, ripple, sorted(options.items()))
+    return Shelf(keep, _CLASSES).get((plant.text, point, *asked), measured)
+
+
+def _measured(
+    case: Case,
+    settling: float,
+    frequency: float,
+    amplitude: float,
+    tolerance: float,
+    most_periods: int,
+    ripple: bool,
+    options: dict[str, Any],
+) -> BitResponse:
     starts = [_Start(case, settling, frequency, amplitude, kick, options) for kick in KICKS]
     while True:
         for start in starts:

@@ -107,16 +107,28 @@ def plot_drive(
 
 
 def plot_drilled(
-    ax: Axes, speed: FloatArray, weight: FloatArray, swing: FloatArray, title: str
+    ax: Axes,
+    speed: FloatArray,
+    weight: FloatArray,
+    swing: FloatArray,
+    computed: tuple[FloatArray, FloatArray, FloatArray] | None = None,
 ) -> None:
-    """Draw the index over what was drilled with: rpm and kN."""
+    """Draw the index over what was drilled with, rpm and kN, above what was computed there.
+
+    ``computed`` is speeds (x,), weights (y,) and indices (x, y).
+    """
+    if computed is not None:
+        ax.set_facecolor("#BBBBBB")
+        ax.pcolormesh(
+            _RPM * computed[0], 1e-3 * computed[1], np.ma.masked_invalid(computed[2].T),
+            shading="nearest", cmap="YlOrRd", vmin=0.0, vmax=1.5,
+        )  # fmt: skip
     drawn = ax.scatter(
         _RPM * speed, 1e-3 * weight, c=swing, cmap="YlOrRd", vmin=0.0, vmax=1.5, s=26,
         edgecolors=GREY, linewidths=0.4,
     )  # fmt: skip
     ax.set_xlabel(axis_name("rotary speed", "rpm"))
     ax.set_ylabel(axis_name("weight on bit", "kN"))
-    ax.set_title(title, fontsize="medium")
     ax.figure.colorbar(drawn, ax=ax, label=axis_name("stick-slip index"), extend="max")
 
 

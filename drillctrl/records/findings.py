@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.text import finite_or_none
@@ -15,6 +16,47 @@ from drillctrl.records.fit_values import RecordFit
 from drillctrl.records.peaks import Peak
 from drillctrl.records.record import Record
 from drillctrl.records.swings import Period, Windows, window_means
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedMap:
+    """Runs of the string over speed and weight on bit.
+
+    Attributes
+    ----------
+    speeds, weights : array, (x,), (y,)
+        rad/s and N.
+    swing : array, (x, y)
+        Stick-slip index of the bit; NaN where a run ended before it could be measured.
+    outcomes : str array, (x, y)
+        Words as in `Outcome`.
+    top : str
+        What turned the string.
+    """
+
+    speeds: FloatArray
+    weights: FloatArray
+    swing: FloatArray
+    outcomes: npt.NDArray[np.str_]
+    top: str
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the JSON fields: a row for each run."""
+        return [
+            {
+                "speed": float(speed),
+                "weight_on_bit": float(weight),
+                "outcome": str(self.outcomes[i, j]),
+                "swing": finite_or_none(float(self.swing[i, j])),
+            }
+            for i, speed in enumerate(self.speeds)
+            for j, weight in enumerate(self.weights)
+        ]
+
+    def at(self, speed: float, weight: float) -> float:
+        """Return the index of the nearest run."""
+        i, j = np.argmin(abs(self.speeds - speed)), np.argmin(abs(self.weights - weight))
+        return float(self.swing[i, j])
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +78,7 @@ class Findings:
     drive: DriveSeen | None
     measured_error: float | None
     notes: tuple[str, ...]
+    computed: ComputedMap | None = None
 
     def drilled(self) -> list[dict[str, float | None]]:
         """Return speed, weight on bit and index of the windows: the map of what was drilled."""
@@ -85,6 +128,7 @@ class Findings:
             if self.severity is None
             else _pairs(self.severity.times, self.severity.values),
             "drilled": self.drilled(),
+            "computed": [] if self.computed is None else self.computed.rows(),
             "drive": None if self.drive is None else self.drive.to_dict(),
             "bit": None if self.bit is None else self._bit_fields(self.bit),
             "fit": None if self.fit is None else self.fit.to_dict(),

@@ -182,6 +182,8 @@ def _string_data(rig: StringRig) -> dict[str, Any]:
             data["top_drive"]["torque_limit"] = told(drive.torque_limit, units.TORQUE)
         for name in ("delay", "lag", "encoder", "torque_filter"):
             data["top_drive"][name] = told(getattr(drive, name), units.TIME)
+        if drive.encoder_counts is not None:
+            data["top_drive"]["encoder_counts"] = drive.encoder_counts
     if string.hoisting_stiffness is not None:
         data["hoisting"] = {"stiffness": told(string.hoisting_stiffness, units.STIFFNESS)}
     return data

@@ -45,6 +45,9 @@ _TOGETHER, _TOGETHER_SINGLE = 0.4, 0.1
 # logarithms, of the lag in s. A sharp corner of the law meets motion whose band ends.
 _METHOD = {"damping": 0.12, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
 _STRING_METHOD = 0.008
+# Slope of a bit's torque that the form of its law misses, as a share of the drop over the range
+# of speeds: at the collars viscous damping does just the same as such a slope.
+_MISSED_SLOPE = 0.04
 # Of a string of which nothing was known, pipe above a rigid disc.
 _UNKNOWN_METHOD = {"damping": 0.3, "level": 0.08, "drop": 0.15, "decay": 0.2, "lag": 0.025}
 _UNKNOWN_STRING = 0.015
@@ -201,6 +204,10 @@ def _with_method(
         of_law, of_string = _UNKNOWN_METHOD, _UNKNOWN_STRING
     found = with_sharper_law(found, family, wide.stretches, wide.units, inertia, late, wide.margin)
     method = [of_law.get(name, of_string) ** 2 for name in found.names]
+    fastest = 2.0 * float(np.nanmean(record.values["rotary_speed"]))
+    inertia_below = family.effective(found.values.tolist())[1]
+    slope = found.value("drop") / (fastest * found.value("damping") * inertia_below)
+    method[found.names.index("damping")] += (_MISSED_SLOPE * slope) ** 2
     return replace(found, spread=found.spread + np.outer(moved, moved) + np.diag(method))
 
 
@@ -216,9 +223,9 @@ def _told(
 ) -> RecordFit:
     count = len(family.names)
 
-    def estimate(function: Callable[[FloatArray], float]) -> Estimate:
+    def estimate(function: Callable[[FloatArray], float], free: bool = True) -> Estimate:
         value, error = found.told(function)
-        error = min(error, _UNKNOWN)
+        error = min(error, _UNKNOWN) if free else _UNKNOWN
         return Estimate(value, value * math.exp(-_TWICE * error), value * math.exp(_TWICE * error))
 
     def line(values: FloatArray) -> Line:
@@ -236,7 +243,9 @@ def _told(
         late = Estimate(lag, lag, lag)
     stiffness = estimate(lambda v: family.effective(v.tolist())[0])
     mass = estimate(lambda v: family.effective(v.tolist())[1])
-    damping = parameter("damping")
+    place = family.names.index("damping")
+    inside = 1.02 * family.low[place] < found.values[place] < 0.98 * family.high[place]
+    damping = estimate(lambda v: float(v[place]), free=bool(inside))
     carrier = Carrier(line(found.values), inertia, late.value)
     first = record.part(0.0, end)
     try:

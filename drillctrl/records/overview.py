@@ -87,7 +87,8 @@ def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
         )
     drilled = _drilled(study)
     if drilled is not None:
-        found.append(("What was drilled", drilled))
+        computed = "" if study.computed is None else f" (dots), and computed, {study.computed.top}"
+        found.append((f"What was drilled{computed}", drilled))
     if bit is not None:
         found.append((_LAW if _reference(study) is None else _AT_MEAN, _law(study)))
     return found
@@ -152,7 +153,9 @@ def _drilled(study: Findings) -> Callable[[Axes], None] | None:
         np.array([row[name] for row in rows], dtype=float)
         for name in ("speed", "weight_on_bit", "swing")
     )
-    return lambda ax: drawing.plot_drilled(ax, speed, weight, swing, "")
+    runs = study.computed
+    below = None if runs is None else (runs.speeds, runs.weights, runs.swing)
+    return lambda ax: drawing.plot_drilled(ax, speed, weight, swing, below)
 
 
 def _reference(study: Findings) -> float | None:

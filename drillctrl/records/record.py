@@ -20,8 +20,9 @@ from drillctrl.records.columns import (
     factor,
     read_choices,
 )
+from drillctrl.records.health import without_spikes
 from drillctrl.records.raw import Column, read_columns
-from drillctrl.records.text import numbers_of
+from drillctrl.records.text import known_numbers, numbers_of
 from drillctrl.records.times import instants
 
 _FEWEST_ROWS = 50
@@ -164,7 +165,7 @@ def _numbers(column: Column, source: str) -> FloatArray:
     if isinstance(column.cells, list):
         return numbers_of(column.cells, column.name, source)
     data = np.asarray(column.cells, dtype=float)
-    return np.where(np.isfinite(data) & (data != -999.25), data, np.nan)
+    return known_numbers(data)
 
 
 def _even(
@@ -201,6 +202,8 @@ def _even(
     if count > _MOST_SAMPLES:
         wanted = f"at most {_MOST_SAMPLES} steps of {step:g} s from first to last"
         raise InputError(f"times of {source}", f"{count} steps", wanted)
+    rows, more = without_spikes(times, rows, step)
+    notes += more
     grid = step * np.arange(count)
     gaps = steps[steps > _GAP * step]
     if gaps.size:

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 _STEP = 0.05
 _STICKS = 0.02
 _MODES_NEED = 120.0
+# Up to which share of the sampling rate motion is seen, and how many lines of a swing a fit needs.
+_SEEN, _FAST, _LINES = 0.4, 2.0, 4.0
 
 
 class RecordStudy(Findings):
@@ -79,6 +81,8 @@ class RecordStudy(Findings):
         Rms of carried less measured speed of the bit, rad/s, in the band.
     notes : tuple of str
         On the rows, the columns and what could not be told.
+    computed : ComputedMap or None
+        Runs over speed and weight, of `with_computed_map`.
     """
 
     def summary(self) -> str:
@@ -158,6 +162,17 @@ def study_record(
     name = "torque" if "torque" in values else "bit_speed"
     period = period_of(values[name], record.step, record.segments(name, shortest=10.0))
     surface = {"rotary_speed", "torque"} <= values.keys()
+    seen = _SEEN / record.step
+    if seen < _FAST:
+        notes.append(
+            f"at {1.0 / record.step:.3g} Hz nothing faster than {seen:.2g} Hz is seen: no mode, no "
+            "wave, and of the bit's speed no more than what is slower"
+        )
+    if fit and period is not None and seen * period.value < _LINES:
+        notes.append(
+            f"no string was fitted: that takes {_LINES / _SEEN / period.value:.2g} Hz or more here"
+        )
+        fit = False
     found: RecordFit | None = None
     carrier: Carrier | None = None
     prepared: Prepared | None = None

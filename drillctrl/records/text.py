@@ -178,7 +178,7 @@ def numbers_of(cells: Sequence[str], name: str, source: str) -> FloatArray:
     """
     if set("".join(cells)) <= _SIGNS and all(cells):
         with contextlib.suppress(ValueError):
-            return _known(np.array(cells, dtype=float))
+            return known_numbers(np.array(cells, dtype=float))
     commas = any(_COMMA.fullmatch(cell) for cell in cells)
     values = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
@@ -194,8 +194,9 @@ def numbers_of(cells: Sequence[str], name: str, source: str) -> FloatArray:
             shown = cell if len(cell) <= 40 else f"{cell[:40]}…"
             raise InputError(f"{name}, row {i + 1} of {source}", shown, "a number, or empty")
         values[i] = float(plain)
-    return _known(values)
+    return known_numbers(values)
 
 
-def _known(values: FloatArray) -> FloatArray:
+def known_numbers(values: FloatArray) -> FloatArray:
+    """Return numbers, NaN where one says that there is none."""
     return np.where(np.isin(values, _ABSENT) | np.isinf(values), np.nan, values)

@@ -33,6 +33,8 @@ def record_rows(study: Findings) -> list[tuple[str, str]]:
         rows.append(("drive", _drive(study)))
     if study.fit is not None:
         rows += _fit(study.fit)
+    if study.computed is not None:
+        rows.append(("computed map", _computed(study)))
     record = study.record
     span = f"{record.duration:.0f} s at {1.0 / record.step:.3g} Hz"
     rows.append(("record", f"{span}{'' if record.start is None else f', from {record.start}'}"))
@@ -116,6 +118,20 @@ def _drive(study: Findings) -> str:
     if reflection is None:
         return f"impedance {size:.3g} N·m·s at {at}, seen {span}"
     return f"returns {reflection[place]:.2f} of a wave at {at}, seen {span}"
+
+
+def _computed(study: Findings) -> str:
+    found = study.computed
+    assert found is not None
+    sticks = int(np.sum(found.outcomes == "stick-slip"))
+    rows = [row for row in study.drilled() if row["weight_on_bit"] is not None]
+    off = [
+        abs(found.at(float(row["speed"] or 0.0), float(row["weight_on_bit"] or 0.0)) - row["swing"])
+        for row in rows
+        if row["swing"] is not None
+    ]
+    near = f"; off what was drilled by {np.nanmedian(off):.2f} in the median" if off else ""
+    return f"{sticks} of {found.swing.size} runs from a kick stick and slip, {found.top}{near}"
 
 
 def _first(study: Findings) -> float:

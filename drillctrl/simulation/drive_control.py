@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -83,6 +84,7 @@ def drive_controller(
             raise InputError(f"{name} of the drive", getattr(drive, name), wanted)
     if machine.encoder:
         raise InputError("encoder of the drive", machine.encoder, "0 in the simulator")
+    _check_counts(machine)
     proportional, integral = _gains(control)
     unit, time = rig.torsional_stiffness, rig.time_scale
     limit = _spare_torque(as_case(where), machine, unit)
@@ -147,6 +149,7 @@ def law_controller(
     if control.speed.excess > 0 and not machine.encoder:
         wanted = "a law without compensated inertia, or a drive with an encoder's filter"
         raise InputError("control", control.name, wanted)
+    _check_counts(machine)
     case = as_case(where, asking_plant(rig, control, bit))
     time = rig.time_scale
     return case, Controller(
@@ -175,8 +178,8 @@ def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[
     Returns
     -------
     Case, dict
-        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay and actuator_lag of
-        its machine as `Controller` takes them.
+        Outputs ``phi`` and ``dphi``, input ``drive``; limit, measurement_delay, actuator_lag and
+        encoder of its machine as `SteppedRun` takes them.
 
     Raises
     ------
@@ -195,6 +198,8 @@ def free_drive(where: RigPoint, bit: BitRock | None = None) -> tuple[Case, dict[
         "measurement_delay": machine.delay / rig.time_scale,
         "actuator_lag": machine.lag / rig.time_scale,
     }
+    if machine.encoder_counts is not None:
+        around["encoder"] = math.tau / machine.encoder_counts
     return case, around if limit is None else {**around, "limit": limit}
 
 
@@ -215,7 +220,7 @@ def simulate_drive(
     law: SampledDrive,
     *,
     duration: float = 200.0,
-    depth: float | None = None,
+    depth: float | Sequence[float] | None = None,
     **options: Any,
 ) -> Simulation:
     """Simulate the string under a sampled law of its drive, as the exported source computes it.
@@ -229,8 +234,9 @@ def simulate_drive(
         torque comes to that of steady drilling, which leaves so much less of the limit.
     duration : float
         Dimensionless time to simulate.
-    depth : float, optional
-        That the law is told, m; by default the length of the string.
+    depth : float or sequence of float, optional
+        What the law is told on its axes, SI; by default of where it drills: the length of the
+        string, the rotary speed, the strength of the rock, the density of the mud.
     **options
         Of `SteppedRun`: scenario, initial, cutting, backwards, rtol, atol, and of the drive
         measurement_delay and actuator_lag where they are not those of the rig's.
@@ -255,7 +261,13 @@ def simulate_drive(
         case, ("dphi",), ("drive",), period=law.period / time, duration=duration,
         **{**around, **options},
     )  # fmt: skip
-    place = rig.string.length if depth is None else depth
+    here = {
+        "depth": rig.string.length,
+        "rotary_speed": where.rotary_speed,
+        "rock_strength": rig.rock_strength,
+        "mud": rig.string.mud_density,
+    }
+    place = [here[name] for name, _ in law.axes] if depth is None else depth
     late, lag = (float({**around, **options}[name]) * time for name in DRIVE_PATH)
     kept = math.exp(-law.period / lag) if lag else 0.0
     # What the drive gave when the speed was measured that is there now.
@@ -270,6 +282,13 @@ def simulate_drive(
         run.hold([command / torque])
         run.advance()
     return run.result()
+
+
+def _check_counts(machine: DriveMachine) -> None:
+    """Refuse an encoder that counts where a law feeds back its states."""
+    if machine.encoder_counts is not None:
+        wanted = "left out here: simulate_drive and bench count, sample by sample"
+        raise InputError("encoder_counts of the drive", machine.encoder_counts, wanted)
 
 
 def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | None:

@@ -139,7 +139,7 @@ def _steady(run: Simulation) -> str:
     """Say when the motion had settled."""
     after = run.summary.settling_time
     told = "settles to steady drilling"
-    return told if after is None else f"{told}, to 2 % after {after:.4g}{_seconds(run, after)}"
+    return told if after is None else f"{told}, to 2 % after {_seconds(run, after)}"
 
 
 def _resting(run: Simulation) -> bool:
@@ -158,12 +158,12 @@ def _ended(run: Simulation) -> str:
     """Say how the run ended, and when if it broke off."""
     if run.status == Status.DONE:
         return str(run.status)
-    return f"{run.status} at {run.times[-1]:.6g}"
+    return f"{run.status} at {_seconds(run, float(run.times[-1]))}"
 
 
 def _seconds(run: Simulation, time: float) -> str:
     told = run.case.told_rig
-    return "" if told is None else f" = {time * told.time_scale:.4g} s"
+    return f"{time:.6g}" if told is None else f"{time * told.time_scale:.4g} s"
 
 
 def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> str:
@@ -171,16 +171,16 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     s, p, rig = run.summary, run.point, run.case.told_rig
     least, most = (_near_zero(v, 1e-9 * p.omega0) for v in (s.bit_speed_min, s.bit_speed_max))
     lowest, highest = (_near_zero(v, run.resolved) for v in (s.axial_min, s.axial_max))
-    speed = ""
+    speed = f"{least:.6g} to {most:.6g}"
     if rig is not None:
         low, high = (
             units.from_si(v / rig.time_scale, units.ROTARY_SPEED, "rpm") for v in (least, most)
         )
-        speed = f"{low:.4g} to {high:.4g} rpm = "
+        speed = f"{low:.4g} to {high:.4g} rpm"
     if s.settled:
         motion = _steady(run)
     elif s.period is not None:
-        motion = f"periodic orbit, period {s.period:.6g}{_seconds(run, s.period)}"
+        motion = f"periodic orbit, period {_seconds(run, s.period)}"
     elif run.scenario.changes and _resting(run):
         motion = "steady by the end, at the changed point"
     else:
@@ -196,8 +196,8 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         ("Outcome", _outcome_text(run)),
         *([] if rig is None else [("Drilling", run.case.place)]),
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
-        ("Run", f"{run.model} model, {run.duration:g} time units"
-         f"{_seconds(run, run.duration)}, {_ended(run)}"),
+        ("Run", f"{run.model} model, "
+         f"{_seconds(run, run.duration)}{' time units' if rig is None else ''}, {_ended(run)}"),
         *([] if run.status == Status.DONE else [("", str(run.status.sentence))]),
         *_chatter_lines(run),
         ("Motion", motion),
@@ -209,21 +209,21 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         found = f"over {multipliers.period:.4g}" if error is None else f"1 found within {error:.0e}"
         lines.append(("Multipliers", f"{values} ({found})"))
     lines += [
-        ("Bit speed", f"{speed}{least:.6g} to {most:.6g}"),
-        ("Axial", f"{_length_text(run, lowest, highest)}x from {lowest:.6g} to {highest:.6g}"),
+        ("Bit speed", speed),
+        ("Axial", _length_text(run, lowest, highest)),
         *_load_lines(run),
         *_backwards_lines(run),
-        ("Delay", f"at most {s.delay_max:.6g}{_seconds(run, s.delay_max)} (steady {p.delay:.6g})"),
+        ("Delay", f"at most {_seconds(run, s.delay_max)} (steady {_seconds(run, p.delay)})"),
     ]
     if run.controller is not None:
-        torque = ""
+        torque = f"largest |u| = {s.max_abs_u:.6g}"
         driven = run.controller.feedback.inputs  # type: ignore[union-attr]
         if rig is not None and driven in (("torque",), ("drive",)):
             newton_metres = s.max_abs_u * rig.torsional_stiffness
-            torque = f" = {run.case.language.text('torque', newton_metres)}"
+            torque = f"largest torque {run.case.language.text('torque', newton_metres)}"
         share = _saturated(run)
         limited = f", at a limit for {share:.1%} of the run" if share else ""
-        lines.append(("Control", f"largest |u| = {s.max_abs_u:.6g}{torque}{limited}"))
+        lines.append(("Control", f"{torque}{limited}"))
     lines.append(("Effort", f"{s.steps} steps, {s.events} events, {s.elapsed_seconds:.3g} s"))
     return set_out(lines)
 
@@ -251,10 +251,8 @@ def _cell(value: float | None, form: str) -> str:
 
 def _length_text(run: Simulation, *axial: float) -> str:
     factor, unit = told_scale("length", run.case.told_rig, run.case.language)
-    if not unit:
-        return ""
     low, high = (factor * x for x in axial)
-    return f"{low:.4g} to {high:.4g} {unit} = "
+    return f"{low:.4g} to {high:.4g} {unit}" if unit else f"x from {low:.6g} to {high:.6g}"
 
 
 def _complex(value: complex) -> str:

@@ -40,6 +40,9 @@ class SteppedRun:
         When the run ends.
     limit, rate_limit, measurement_delay, actuator_lag
         As of `Controller`.
+    encoder : float, optional
+        Angle of a count of the encoder at the top drive: the outputs ``phi`` and ``dphi`` are what
+        it counts, and that over a period.
     max_steps : int
         As of `simulate`.
     **options
@@ -68,6 +71,7 @@ class SteppedRun:
         rate_limit: float | None = None,
         measurement_delay: float = 0.0,
         actuator_lag: float = 0.0,
+        encoder: float | None = None,
         max_steps: int = 100_000_000,
         **options: Any,
     ) -> None:
@@ -95,6 +99,12 @@ class SteppedRun:
         self._wanted = np.array(
             [rows + structure.output_names.index(name) for name in outputs], dtype=np.int64
         )
+        self._measured, self._count = tuple(outputs), 0.0
+        if encoder is not None:
+            self._count = checked_number("encoder", encoder, 0.0, math.tau, open_low=True)
+            if "phi" not in structure.state_names:
+                raise InputError("encoder", encoder, "left out where there is no top drive")
+            self._top = np.array([names.index("phi"), names.index("dphi")], dtype=np.int64)
         self._driven = [structure.input_names.index(name) for name in inputs]
         # Compiles what is not compiled yet, before any clock runs.
         self._go_on(0.0)
@@ -112,9 +122,28 @@ class SteppedRun:
 
     def outputs(self) -> FloatArray:
         """Return what is measured now (a measurement delay ago), (p,)."""
+        when = self.time - self._controller.measurement_delay
+        found = self._at(when, self._wanted)
+        return found + self._miscounted(when) if self._count else found
+
+    def _miscounted(self, when: float) -> FloatArray:
+        """Return what an encoder tells beyond the outputs as they are, (p,)."""
+        period, speed = self._controller.period, self._structure.omega0
+        assert period is not None
+        angle, rate = self._at(when, self._top)
+        before = self._at(when - period, self._top)[0]
+        turned = np.array([speed * when + angle, speed * (when - period) + before])
+        counted = np.floor(turned / self._count) * self._count
+        told = {
+            "phi": counted[0] - turned[0],
+            "dphi": (counted[0] - counted[1]) / period - speed - rate,
+        }
+        return np.array([told.get(name, 0.0) for name in self._measured])
+
+    def _at(self, when: float, wanted: npt.NDArray[np.int64]) -> FloatArray:
+        """Return some columns of a sample at an instant that has passed."""
         standing = self._standing
         used = int(standing.ints[self._march.STEPS])
-        when = self.time - self._controller.measurement_delay
         start = standing.history.real[:used, data.START]
         place = max(int(np.searchsorted(start, when, side="right")) - 1, 0)
         found: FloatArray = self._evaluate(
@@ -123,7 +152,7 @@ class SteppedRun:
             used,
             np.array([place], dtype=np.int64),
             np.array([when]),
-            self._wanted,
+            wanted,
         )
         return found[:, 0]
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 
 _MOST_COEFFICIENTS = 21
 
@@ -39,6 +39,9 @@ class DriveMachine:
         Time constant of the torque, s; 0 for none.
     encoder : float
         Time constant of the measured speed, s; 0 for none.
+    encoder_counts : int or None
+        Counts of the encoder in a turn of the string, of which a sampled law takes its speed: what
+        is counted over a period. Nothing linear depends on it; None for a speed as it is.
     torque_filter : float
         Time constant of the measured torque in the pipe, s; that is the drive's own torque less
         J times its acceleration, which needs one.
@@ -55,6 +58,7 @@ class DriveMachine:
     lag: float = 0.0
     encoder: float = 0.0
     torque_filter: float = 0.01
+    encoder_counts: int | None = None
 
     def __post_init__(self) -> None:
         checked_number("inertia of the drive", self.inertia, 0.0, 1e9, open_low=True)
@@ -63,6 +67,8 @@ class DriveMachine:
         for name in ("delay", "lag", "encoder"):
             checked_number(f"{name} of the drive", getattr(self, name), 0.0, 10.0)
         checked_number("torque filter", self.torque_filter, 0.0, 10.0, open_low=True)
+        if self.encoder_counts is not None:
+            checked_integer("encoder counts", self.encoder_counts, 1, 1_000_000_000)
 
     @property
     def lateness(self) -> float:

@@ -1,13 +1,8 @@
 """Dynamic output feedback of a top drive, designed to let the bit's torque fall most steeply.
 
-The law brakes by the top's speed and angle and drives by the pipe's torque, with N states:
-
-    A(s) = h (1 + k/s) + a(s)/e(s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
-
-k not below what brings a speed that sags back in some seconds, e in factors of first and second
-order that are damped. What is maximised is the smallest critical slope over the first modes, over
-shorter and longer strings and a later drive too. It is nonsmooth, as the largest real part of
-roots is, and BFGS descends it as it does that.
+What is maximised over the laws of `drive_family` is the smallest critical slope over the first
+modes, over shorter and longer strings and a later drive too. It is nonsmooth, as the largest real
+part of roots is, and BFGS descends it as it does that.
 """
 
 from __future__ import annotations
@@ -21,7 +16,8 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
+from drillctrl.strings.drive_control import DriveControl, DriveMachine
+from drillctrl.strings.drive_family import DriveSignals, LawFamily, drive_signals
 from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import (
@@ -32,17 +28,8 @@ from drillctrl.strings.slopes import (
     mode_slopes,
 )
 from drillctrl.synthesis.descent import bfgs
-from drillctrl.synthesis.spread import spread_points
 
 MODES = 4
-# Speed gains in units of ζ, torque gains as such; corners in units of the speed that scales s.
-_SPEED_GAIN, _INTEGRAL, _TORQUE_GAIN = 100.0, 5.0, 30.0
-# Seconds in which the integral of speed makes up for as much as the speed does: a drive that
-# yields to the pipe sags under a load, and a bit that turns more slowly sticks sooner.
-_RECOVERS = 10.0
-_CORNER, _DAMPING = (0.1, 30.0), (0.2, 1.5)
-# A swing of the top of 10 rpm must not take more than the torque limit.
-_SMALLEST_SWING = 10.0 * math.pi / 30.0
 # Higher modes count in proportion to what they stand under a held top: where the first ones reach
 # the second share of the impedance of the lowest stretch, they keep the first share of that.
 _KEPT, _AIM = 0.2, 0.15
@@ -53,7 +40,7 @@ _GROWTH = 1e-3
 # Above those frequencies up to this one in Hz: how many, and samples of the string for each.
 _HIGHEST, _FAR, _WITHIN, _ALONE = 60.0, 60, 40, 80
 _FEWER = 4
-_LOOKED, _BEGUN, _STEPS = 48, 3, 220
+_BEGUN, _STEPS = 3, 220
 _CHANGE = 1e-6
 
 
@@ -66,133 +53,34 @@ class _Loop(NamedTuple):
         iω.
     matrix : array, (q, 2, 2)
         The string's transfer matrix there.
-    drive : _Drive
+    drive : DriveSignals
         The drive there.
     weights : array, (q,)
         By which a critical slope there counts.
-    near, echo : _Drive and array, (r,)
+    near, echo : DriveSignals and array, (r,)
         The drive a little right of the axis, from the real axis on, and what the string with a
         free bit returns there of a wave from the top.
-    far, loudest : _Drive and array, (p,)
+    far, loudest : DriveSignals and array, (p,)
         The drive above these frequencies, and the most that the string returns around there.
-    alone : _Drive
+    alone : DriveSignals
         The drive from the real axis to where it is its inertia and nothing else.
     """
 
     s: ComplexArray
     matrix: ComplexArray
-    drive: _Drive
+    drive: DriveSignals
     weights: FloatArray
-    near: _Drive
+    near: DriveSignals
     echo: ComplexArray
-    far: _Drive
+    far: DriveSignals
     loudest: FloatArray
-    alone: _Drive
-
-
-class _Drive(NamedTuple):
-    """A machine at some s: J s, and what its path and filters make of gains on speed and torque."""
-
-    inertia: ComplexArray
-    speed: ComplexArray
-    torque: ComplexArray
-    x: ComplexArray
-
-    def pick(self, where: slice) -> _Drive:
-        """Return the drive at some of these s."""
-        return _Drive(*(values[where] for values in self))
-
-
-class _Family:
-    """Laws of one order by a vector of numbers in a box; x is s over a rate.
-
-    The vector: h, k over the rate, g; for an odd order the logarithm of a corner c and the parts
-    of it in A and B, each over x/c + 1; for every further two states the logarithm of c, the
-    damping z and two parts each, over (x/c)² + 2 z x/c + 1.
-    """
-
-    def __init__(self, order: int, pipe: float, rate: float, machine: DriveMachine) -> None:
-        self.order, self.pipe, self.rate = order, pipe, rate
-        largest = _SPEED_GAIN
-        if machine.torque_limit is not None:
-            largest = min(largest, machine.torque_limit / (_SMALLEST_SWING * pipe))
-        corner = (math.log(_CORNER[0]), math.log(_CORNER[1]))
-        speed, torque = (-_SPEED_GAIN, _SPEED_GAIN), (-_TORQUE_GAIN, _TORQUE_GAIN)
-        slowest = min(1.0 / (_RECOVERS * rate), 0.5 * _INTEGRAL)
-        rows = [(0.0, largest), (slowest, _INTEGRAL), (0.0, _TORQUE_GAIN)]
-        rows += [corner, speed, torque] * (order % 2)
-        rows += [corner, _DAMPING, speed, speed, torque, torque] * (order // 2)
-        self.lower, self.upper = np.array(rows).T
-
-    def starts(self, known: FloatArray) -> FloatArray:
-        """Return numbers that begin descents, (q, k): laws with fewer states, and around them."""
-        more = self.lower.size - known.shape[1]
-        corner = math.log(3.0 + 1.5 * self.order)
-        fresh = np.array([corner, 0.0, 0.0] if more == 3 else [corner, 0.8, *[0.0] * 4])
-        begun = np.hstack([known, np.tile(fresh[:more], (len(known), 1))])
-        cube = spread_points(_LOOKED, self.lower.size, 0) - 0.5
-        spread = begun[-1] + cube * (0.5 * np.abs(begun[-1]) + 0.02 * (self.upper - self.lower))
-        inset = 1e-3 * (self.upper - self.lower)
-        whole = np.vstack([begun, spread])
-        return np.asarray(np.clip(whole, self.lower + inset, self.upper - inset))
-
-    def _sections(self, numbers: FloatArray) -> list[tuple[list[float], list[float], list[float]]]:
-        """Return denominators with their numerators in A and B, coefficients of x."""
-        found, at = [], 3
-        if self.order % 2:
-            corner, a, b = numbers[at : at + 3].tolist()
-            found.append(([math.exp(-corner), 1.0], [a], [b]))
-            at += 3
-        for corner, damping, a1, a0, b1, b0 in numbers[at:].reshape(-1, 6).tolist():
-            c = math.exp(-corner)
-            found.append(([c * c, 2.0 * damping * c, 1.0], [a1 * c, a0], [b1 * c, b0]))
-        return found
-
-    def ends(self, numbers: FloatArray, drive: _Drive) -> tuple[ComplexArray, ComplexArray]:
-        """Return what `DriveControl.ends` does, quickly."""
-        x = drive.x
-        speed, torque = numbers[0] * (1.0 + numbers[1] / x), np.asarray(numbers[2], dtype=complex)
-        for below, a, b in self._sections(numbers):
-            under = 1.0 / _value(below, x)
-            speed = speed + _value(a, x) * under
-            torque = torque + _value(b, x) * under
-        return 1.0 + drive.torque * torque, drive.inertia + drive.speed * speed
-
-    def laws(self, numbers: FloatArray) -> tuple[Transfer, Transfer]:
-        """Return A and B."""
-        speed = (numbers[0] * np.array([1.0, numbers[1]]), np.array([1.0, 0.0]))
-        torque = (np.array([numbers[2]]), np.ones(1))
-        for below, a, b in self._sections(numbers):
-            speed, torque = _sum(speed, a, below), _sum(torque, b, below)
-        return self._transfer(self.pipe * speed[0], speed[1]), self._transfer(*torque)
-
-    def _transfer(self, above: FloatArray, below: FloatArray) -> Transfer:
-        """Return a function of s from coefficients of x."""
-        powers = self.rate ** -np.arange(below.size - 1.0, -1.0, -1.0)
-        scale = below[0] * powers[0]
-        above = np.append(np.zeros(below.size - above.size), above)
-        return Transfer(tuple(above * powers / scale), tuple(below * powers / scale))
-
-
-def _value(coefficients: list[float], x: ComplexArray) -> ComplexArray:
-    if len(coefficients) == 1:
-        return np.asarray(coefficients[0], dtype=complex)
-    found = coefficients[0] * x + coefficients[1]
-    return found if len(coefficients) == 2 else found * x + coefficients[2]
-
-
-def _sum(
-    whole: tuple[FloatArray, FloatArray], above: list[float], below: list[float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return a sum of two rational functions."""
-    top = np.polyadd(np.convolve(whole[0], below), np.convolve(whole[1], above))
-    return np.asarray(top), np.convolve(whole[1], below)
+    alone: DriveSignals
 
 
 class _Slopes:
     """Minus the smallest weighted critical slope over all loops, and its gradient."""
 
-    def __init__(self, family: _Family, loops: list[_Loop]) -> None:
+    def __init__(self, family: LawFamily, loops: list[_Loop]) -> None:
         self.family, self.loops = family, loops
 
     def value(self, numbers: FloatArray) -> tuple[float, int, int]:
@@ -235,7 +123,7 @@ class _Slopes:
         return -value / pipe, -slope * loop.weights[at] / pipe
 
     def _impedance(
-        self, numbers: FloatArray, s: ComplexArray, matrix: ComplexArray, drive: _Drive
+        self, numbers: FloatArray, s: ComplexArray, matrix: ComplexArray, drive: DriveSignals
     ) -> ComplexArray:
         """Return the impedance that the bit sees."""
         speed, torque = self.family.ends(numbers, drive)
@@ -251,7 +139,7 @@ class _Slopes:
         """
         pipe = self.family.pipe
 
-        def parts(drive: _Drive) -> tuple[ComplexArray, ComplexArray]:
+        def parts(drive: DriveSignals) -> tuple[ComplexArray, ComplexArray]:
             speed, torque = self.family.ends(numbers, drive)
             whole = torque + pipe * speed
             return whole, (torque - pipe * speed) / whole
@@ -321,16 +209,12 @@ def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
     within = np.linspace(edges[:-1], edges[1:], _WITHIN, axis=1)
     loudest = np.abs(echo(right_of(within.ravel()))).reshape(within.shape).max(axis=1)
     alone = right_of(np.append(0.0, np.geomspace(1e-3, _HIGHEST, _ALONE)))
-    drives = [_drive(machine, pipe, rate, at) for at in (s, near, right_of(edges[1:]), alone)]
+    drives = [
+        drive_signals(machine, pipe, rate, at) for at in (s, near, right_of(edges[1:]), alone)
+    ]
     return _Loop(
         s, matrix, drives[0], weights, drives[1], echo(near), drives[2], loudest, drives[3]
     )
-
-
-def _drive(machine: DriveMachine, pipe: float, rate: float, s: ComplexArray) -> _Drive:
-    plain = DriveControl("path", machine, Transfer((pipe,)), Transfer((1.0,)))
-    path, (speed, torque) = plain.path(s), plain.laws(s)
-    return _Drive(machine.inertia * s, path * speed, path * torque, s / rate)
 
 
 @checks_kinds
@@ -373,7 +257,7 @@ def dynamic_drive_control(
         loops.append(_loop(line, later, aim, rate))
     known = np.array([[4.0, 0.25, 0.0], [30.0, 0.1, 4.0], [40.0, 0.175, 9.0]])
     for grown in range(n % 2, n + 1, 2):
-        family = _Family(grown, line.wave_impedance, rate, machine)
+        family = LawFamily(grown, line.wave_impedance, rate, machine)
         known = _best(family, _Slopes(family, loops), known)[None, :]
     found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
     soft = soft_torque_control(machine, line.wave_impedance, float(modes[0]))
@@ -389,7 +273,7 @@ def dynamic_drive_control(
     return replace(found, speed=soft.speed, torque=soft.torque)
 
 
-def _best(family: _Family, goal: _Slopes, known: FloatArray) -> FloatArray:
+def _best(family: LawFamily, goal: _Slopes, known: FloatArray) -> FloatArray:
     """Return the best numbers that descents from laws with fewer states find."""
     starts = family.starts(known)
     values = -np.array([goal.value(start)[0] for start in starts])

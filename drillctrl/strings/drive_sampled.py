@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypedDict, Unpack
 
@@ -20,7 +20,7 @@ from drillctrl.strings.drives_words import law_text
 
 # What the status says, bit by bit; the values are those of controllers of tables.
 DRIVE_BITS = (
-    ("OUTSIDE", 1, "the depth is none of the table's: the law of the nearest end stands"),
+    ("OUTSIDE", 1, "the place is none of the table's: the law of the nearest end stands"),
     ("HELD", 2, "the sample was none, or cannot be: the last good one stands"),
     ("LOST", 4, "too many samples in a row were none"),
     ("FROZEN", 8, "too many samples of the speed in a row were equal"),
@@ -28,8 +28,15 @@ DRIVE_BITS = (
     ("SLOWED", 64, "the fastest change of the torque was met"),
     ("LIMITED", 128, "the limit of the torque was met"),
 )
-# What no top drive turns at, rad/s, no torque is, in limits of it, and no string is long, m.
-_FASTEST, _STRONGEST, _DEEPEST = 100.0, 2.0, 1e5
+# What no top drive turns at, rad/s, and no torque is, in limits of it.
+_FASTEST, _STRONGEST = 100.0, 2.0
+# Coordinates that a law may be scheduled over: unit, largest, and what a coordinate is.
+DRIVE_AXES = {
+    "depth": ("m", 1e5, "length of the string"),
+    "rotary_speed": ("rad/s", 100.0, "rotary speed that the law is scheduled by"),
+    "rock_strength": ("Pa", 1e10, "strength of the rock"),
+    "mud": ("kg/m3", 1e4, "density of the mud"),
+}
 _LONGEST, _MOST_NODES = 1_000_000_000, 200
 
 
@@ -96,10 +103,11 @@ class SampledDrive:
         The drive; its encoder's filter is taken to be in what is measured.
     period, limit : float
         s, and largest magnitude of the torque, N m.
-    depths : tuple of float
-        m, rising; one for a law that stands at any depth.
+    axes : tuple of (str, tuple of float)
+        Coordinates of `DRIVE_AXES` in SI with their rising values; of one that has a single
+        value the law stands anywhere.
     nodes : tuple of DriveNode
-        One a depth, all of one order.
+        One a place, the last axis running fastest, all of one order.
     ramp, fade, hold, frozen, release : int
         As of `DriveOptions`.
     watched : bool
@@ -109,14 +117,14 @@ class SampledDrive:
     most : float
         Largest magnitude of the integral: what holds the limit at rest, N m.
     words : tuple of str
-        The laws, a line a depth.
+        The laws, a line a place.
     """
 
     name: str
     machine: DriveMachine
     period: float
     limit: float
-    depths: tuple[float, ...]
+    axes: tuple[tuple[str, tuple[float, ...]], ...]
     nodes: tuple[DriveNode, ...]
     ramp: int
     fade: int
@@ -135,28 +143,34 @@ class SampledDrive:
 
     @property
     def integrates(self) -> bool:
-        """Whether the law has an integral, at every depth."""
+        """Whether the law has an integral, at every place."""
         return self.nodes[0].K != 0.0
 
     @property
-    def largest(self) -> tuple[float, float, float, float]:
-        """Magnitudes of speed, set point, torque and depth beyond which a sample is none.
+    def largest(self) -> tuple[float, ...]:
+        """Magnitudes of speed, set point, torque and coordinates beyond which a sample is none.
 
         States of a law remember for seconds, so that what cannot be is kept from them.
         """
-        return _FASTEST, _FASTEST, _STRONGEST * self.limit, _DEEPEST
+        beyond = (DRIVE_AXES[name][1] for name, _ in self.axes)
+        return _FASTEST, _FASTEST, _STRONGEST * self.limit, *beyond
 
     @property
-    def edges(self) -> tuple[float, ...]:
-        """Depths at which one law takes over from the one before."""
-        return tuple(0.5 * (a + b) for a, b in itertools.pairwise(self.depths))
+    def edges(self) -> tuple[tuple[float, ...], ...]:
+        """Where one law takes over from the one before, on each axis."""
+        return tuple(
+            tuple(0.5 * (a + b) for a, b in itertools.pairwise(values)) for _, values in self.axes
+        )
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """Between which depths the table has a law."""
-        if len(self.depths) == 1:
-            return -_DEEPEST, _DEEPEST
-        return self.depths[0], self.depths[-1]
+    def ends(self) -> tuple[tuple[float, float], ...]:
+        """Between which coordinates the table has a law, on each axis."""
+        return tuple(
+            (values[0], values[-1])
+            if len(values) > 1
+            else (-DRIVE_AXES[name][1], DRIVE_AXES[name][1])
+            for name, values in self.axes
+        )
 
     @property
     def filters(self) -> tuple[float, float, float, float]:
@@ -184,7 +198,8 @@ def sampled_drive(
     *,
     period: float,
     limit: float | None = None,
-    depths: Sequence[float] = (0.0,),
+    depths: Sequence[float] | None = None,
+    axes: Mapping[str, Sequence[float]] | None = None,
     **options: Unpack[DriveOptions],
 ) -> SampledDrive:
     """Return laws of a top drive as a sampled controller.
@@ -192,13 +207,17 @@ def sampled_drive(
     Parameters
     ----------
     controls : DriveControl or sequence of them
-        A proper law, or one for each depth, of one drive.
+        A proper law, or one for each place, of one drive.
     period : float
         Sampling period, s.
     limit : float, optional
         Largest magnitude of the torque, N m; by default that of the machine.
-    depths : sequence of float
-        m, rising. Each law stands up to the middle between depths.
+    depths : sequence of float, optional
+        m, rising: short for ``axes={"depth": depths}``.
+    axes : mapping, optional
+        Coordinates of `DRIVE_AXES`, ``"depth"``, ``"rotary_speed"``, ``"rock_strength"`` and
+        ``"mud"``, with rising values in SI; laws run over the last axis fastest. Each law stands
+        up to the middle between values.
     **options
         Of `DriveOptions`.
 
@@ -209,11 +228,12 @@ def sampled_drive(
         beside one integral, or is of another drive than the others.
     """
     laws = (controls,) if isinstance(controls, DriveControl) else tuple(controls)
-    if not 1 <= len(laws) <= _MOST_NODES or len(laws) != len(depths):
-        raise InputError("depths", list(depths)[:4], f"one for each of 1 to {_MOST_NODES} laws")
-    places = tuple(checked_number("depth", depth, 0.0, _DEEPEST) for depth in depths)
-    if any(b <= a for a, b in itertools.pairwise(places)):
-        raise InputError("depths", places[:4], "rising")
+    places = _places(depths, axes)
+    count_of = math.prod(len(values) for _, values in places)
+    if not 1 <= len(laws) <= _MOST_NODES or len(laws) != count_of:
+        wanted = f"one for each of {count_of} places, at most {_MOST_NODES}"
+        which = "controls" if depths is None else "depths"
+        raise InputError(which, f"{count_of} places and {len(laws)} laws", wanted)
     machine = laws[0].machine
     if any(law.machine != machine for law in laws):
         raise InputError("controls", laws[0].name, "laws of one drive")
@@ -223,7 +243,7 @@ def sampled_drive(
     )
     parts = [_parts(law) for law in laws]
     if len({bool(part[0]) for part in parts}) > 1:
-        raise InputError("controls", laws[0].name, "laws with an integral at every depth, or none")
+        raise InputError("controls", laws[0].name, "laws with an integral at every place, or none")
     order = max(1, *(len(part[1][3]) + len(part[2][3]) for part in parts))
     second = max(1, math.ceil(1.0 / step))
 
@@ -253,6 +273,26 @@ def sampled_drive(
         most * max(1.0 + abs(float(law.torque(0.0).real)) for law in laws),
         tuple(map(law_text, laws)),
     )
+
+
+def _places(
+    depths: Sequence[float] | None, axes: Mapping[str, Sequence[float]] | None
+) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """Return the axes that were given, checked."""
+    if axes is None:
+        axes = {"depth": (0.0,) if depths is None else depths}
+    elif depths is not None or not axes:
+        raise InputError("axes", list(axes), "one or more, with depths among them or left out")
+    found = []
+    for name, values in axes.items():
+        if name not in DRIVE_AXES:
+            raise InputError("axes", name, f"of {', '.join(DRIVE_AXES)}")
+        which = "depths" if depths is not None else name
+        read = tuple(checked_number(which, value, 0.0, DRIVE_AXES[name][1]) for value in values)
+        if not read or any(b <= a for a, b in itertools.pairwise(read)):
+            raise InputError(which, read[:4], "one or more values, rising")
+        found.append((name, read))
+    return tuple(found)
 
 
 _Part = tuple[FloatArray, FloatArray, float, FloatArray]

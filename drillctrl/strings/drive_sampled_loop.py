@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -24,6 +25,8 @@ from drillctrl.strings.slopes import lowest_impedance
 _FREQUENCY, _TOLERANCE = 10.0, 5e-3
 # Growth, 1/s, from which a loop counts as unstable: a string that turns freely has a root at 0.
 _GROWTH = 1e-4
+# Coordinates of a law that change its string.
+_OF_STRING = ("depth", "mud")
 # Of a radius.
 _ROUNDING = 1e-6
 # Between slopes of zero and of the lowest stretch's impedance.
@@ -39,7 +42,7 @@ def sampled_radius(law: SampledDrive, pipe: float) -> float:
     Parameters
     ----------
     law : SampledDrive
-        The largest radius of all its depths is taken.
+        The largest radius of all its places is taken.
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
     """
@@ -61,7 +64,7 @@ def sampled_slope(law: SampledDrive, line: Line, node: int = 0) -> float:
     line : Line
         The string in torsion.
     node : int
-        Which of the law's depths.
+        Which of the law's places.
 
     Returns
     -------
@@ -93,15 +96,15 @@ def sampled_slopes(law: SampledDrive, rig: Rig) -> tuple[float, ...]:
     Parameters
     ----------
     law : SampledDrive
-        Each of its laws is asked of the string at its depth; one that stands at any depth of the
-        string as it is.
+        Each of its laws is asked of the string at its depth and mud; one that stands anywhere of
+        the string as it is.
     rig : StringRig
         The rig.
 
     Returns
     -------
     tuple of float
-        `sampled_slope` at each depth.
+        `sampled_slope` at each place.
 
     Raises
     ------
@@ -115,9 +118,12 @@ def sampled_slopes(law: SampledDrive, rig: Rig) -> tuple[float, ...]:
     if radius > 1.0 + _ROUNDING:
         wanted = f"shorter: with it drive and pipe alone swing up, {radius:.3g}-fold a sample"
         raise InputError("period", shown, wanted)
-    single, found = len(law.depths) == 1, []
-    for node, depth in enumerate(law.depths):
-        there = string if single and not depth else changed_rig(rig, depth=depth).string
+    found = []
+    for node, place in enumerate(itertools.product(*(values for _, values in law.axes))):
+        names = (name for name, _ in law.axes)
+        # A law that stands anywhere is asked of the string as it is.
+        moved = {n: at for n, at in zip(names, place, strict=True) if n in _OF_STRING and at}
+        there = changed_rig(rig, **moved).string if moved else string
         line = there.torsion
         stands = sampled_slope(law, line, node)
         if stands < enough(line, law.machine):

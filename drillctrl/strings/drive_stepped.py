@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 
 from drillctrl.strings.drive_sampled import DRIVE_BITS, SampledDrive
 
@@ -33,7 +34,7 @@ class SteppedDrive:
         self._gains = [node.K for node in law.nodes]
         self._fading = _BIT["LOST"] | (_BIT["FROZEN"] if law.watched else 0)
         self._x = [0.0] * law.order
-        self._good = (0.0, 0.0, 0.0, 0.0)
+        self._good = (0.0,) * (3 + len(law.axes))
         self._seen = self._tracking = False
         self._active = self._missing = self._equal = self._trust = self._releasing = 0
         self._node = 0
@@ -43,7 +44,12 @@ class SteppedDrive:
         self.limit, self.elapsed = law.limit, law.period
 
     def step(
-        self, speed: float, set_point: float, torque: float, depth: float = 0.0, on: bool = True
+        self,
+        speed: float,
+        set_point: float,
+        torque: float,
+        depth: float | Sequence[float] = 0.0,
+        on: bool = True,
     ) -> float:
         """Take one sample and return the torque, N m, within the limit.
 
@@ -54,21 +60,22 @@ class SteppedDrive:
         torque : float
             What the drive gave since the last sample, N m: this controller's last command, or
             that of whatever else is in control, from which it then takes over without a bump.
-        depth : float
-            Length of the string, m; picks the law.
+        depth : float or sequence of float
+            Length of the string, m, which picks the law; or a coordinate on each of its axes, SI.
         on : bool
             Whether the controller is switched on.
         """
         law = self._law
         limit = max(self.limit, 0.0) if self.limit < law.limit else law.limit
-        bits = self._take((speed, set_point, torque, depth))
-        now, wanted, given, place = self._good
+        at = (depth,) if isinstance(depth, int | float) else tuple(depth)
+        bits = self._take((speed, set_point, torque, *at))
+        now, wanted, given, *place = self._good
         error = now - wanted
-        low, high = self._ends
-        self.vouched = self._seen and low <= place <= high
+        within = (low <= x <= high for x, (low, high) in zip(place, self._ends, strict=True))
+        self.vouched = self._seen and all(within)
         if not self.vouched:
             bits |= _BIT["OUTSIDE"]
-        value, change = self._follow(now, error, given, bisect_right(self._edges, place))
+        value, change = self._follow(now, error, given, self._nearest(place))
         trusted = self._seen and not bits & self._fading
         u = 0.0
         if on:
@@ -103,7 +110,7 @@ class SteppedDrive:
             return u
         return max(min(u, self._command + rate), self._command - rate)
 
-    def _take(self, sample: tuple[float, float, float, float]) -> int:
+    def _take(self, sample: tuple[float, ...]) -> int:
         law, bits = self._law, 0
         if not 0.5 * law.period < self.elapsed < 1.5 * law.period:
             bits |= _BIT["CLOCK"]
@@ -123,10 +130,16 @@ class SteppedDrive:
         bits |= _BIT["FROZEN"] * (self._equal >= law.frozen)
         return bits
 
-    def _begin(self, sample: tuple[float, float, float, float]) -> None:
+    def _nearest(self, place: Sequence[float]) -> int:
+        node = 0
+        for edges, x in zip(self._edges, place, strict=True):
+            node = node * (len(edges) + 1) + bisect_right(edges, x)
+        return node
+
+    def _begin(self, sample: tuple[float, ...]) -> None:
         """Let filters of what is measured rest where the first sample finds them."""
-        speed, wanted, torque, depth = sample
-        self._node = bisect_right(self._edges, depth)
+        speed, wanted, torque, *place = sample
+        self._node = self._nearest(place)
         self._slow, self._drag = speed, torque
         self._speed, self._error = speed, speed - wanted
 

@@ -13,6 +13,7 @@ import numpy as np
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import BLUE, GREY, ORANGE, new_figure
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.base.text import finite_or_none, wrapped
 from drillctrl.drilling.rig import Rig
@@ -21,7 +22,7 @@ from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
 from drillctrl.strings.drives import drive_control, machine_of
-from drillctrl.strings.drives_words import law_text
+from drillctrl.strings.drives_words import drive_settings
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import lowest_impedance
@@ -119,27 +120,32 @@ class DriveTable:
                     row[f"{side}_{part}"] = " ".join(map(repr, values))
         return csv_text(list(rows[0]), (list(row.values()) for row in rows))
 
-    def summary(self) -> str:
-        """Return a table for people."""
+    def summary(self, units: str | None = None) -> str:
+        """Return a table for people, in ``"si"`` or ``"field"`` units."""
+        language = told_language(units)
+        deep, slope = language.units["depth"], language.units["impedance"]
+        per = slope.unit.removesuffix("/rad")
+        holds = "Stable with a free bit" if self.stable else "NOT stable with a free bit"
         lines = [
-            f"Top drive under {self.structure} over the depth of its string",
-            "depth, m   first mode, Hz   critical slope, N·m·s   of all to 30 Hz   margin, ms",
+            f"{holds}: top drive under {self.structure} over the depth of its string",
+            f"depth, {deep.unit}  first mode, Hz  critical slope, {per}  "
+            f"of all to 30 Hz  margin, ms",
         ]
         for row in self._rows():
             margin = row["delay_margin"]
             weakest = row["weakest_slope"]
             lines.append(
-                f"{row['depth']:8.6g}{row['first_frequency']:17.4f}"
-                f"{row['smallest_critical_slope']:24.4g}"
-                f"{'any' if weakest is None else f'{weakest:.4g}':>18}"
-                f"{'none' if margin is None else f'{1e3 * margin:.3g}':>13}"
+                f"{deep.per_si * row['depth']:8.6g}{row['first_frequency']:16.4f}"
+                f"{slope.per_si * row['smallest_critical_slope']:{18 + len(per)}.4g}"
+                f"{'any' if weakest is None else f'{slope.per_si * weakest:.4g}':>17}"
+                f"{'none' if margin is None else f'{1e3 * margin:.3g}':>12}"
             )
-        lines += [f"{depth:8.6g} m: {law_text(drive.control)}" for depth, drive in self._laws()]
+        for depth, drive in self._laws():
+            settings = ", ".join(" ".join(row) for row in drive_settings(drive.control, language))
+            lines.append(f"{language.text('depth', depth, 6):>10}: {settings}")
         if self.between:
-            lines.append(
-                f"Held to the middle between depths, laws stand {min(self.between):.4g} N·m·s there"
-            )
-        lines.append("Stable with a free bit" if self.stable else "NOT stable with a free bit")
+            stood = f"{slope.per_si * min(self.between):.4g} {per}"
+            lines.append(f"Held to the middle between depths, laws stand {stood} there")
         if self.harm is not None:
             lines.append(wrapped(f"Refused: at {self.harm}."))
         return "\n".join(lines)
@@ -147,21 +153,31 @@ class DriveTable:
     def _laws(self) -> list[tuple[float, DriveMeasures]]:
         return list(zip(self.depths, self.drives, strict=True))
 
-    def plot(self) -> Figure:
-        """Draw what the laws stand over depth."""
+    def plot(self, units: str | None = None) -> Figure:
+        """Draw what the laws stand over depth, in ``"si"`` or ``"field"`` units."""
+        language = told_language(units)
+        deep, slope = language.units["depth"], language.units["impedance"]
+        depths = deep.per_si * np.array(self.depths)
         figure = new_figure(6.0, 4.0)
         ax = figure.subplots()
         rows = self._rows()
         ceiling = lowest_impedance(self.rig.string.torsion)  # type: ignore[attr-defined]
-        four = [row["smallest_critical_slope"] for row in rows]
-        every = [ceiling if row["weakest_slope"] is None else row["weakest_slope"] for row in rows]
-        ax.plot(self.depths, four, "o-", color=BLUE, label="first four modes")
-        ax.plot(self.depths, every, "s--", ms=4, color=ORANGE, label="all modes to 30 Hz")
+        four = slope.per_si * np.array([row["smallest_critical_slope"] for row in rows])
+        weakest = [row["weakest_slope"] for row in rows]
+        every = slope.per_si * np.array([ceiling if s is None else s for s in weakest])
+        ax.plot(depths, four, "o-", color=BLUE, label="first four modes")
+        ax.plot(depths, every, "s--", ms=4, color=ORANGE, label="all modes to 30 Hz")
         if self.between:
-            middles = 0.5 * (np.array(self.depths[1:]) + np.array(self.depths[:-1]))
-            ax.plot(middles, self.between, "x", color=GREY, label="all modes, law held to there")
-        ax.set_xlabel("length of the string, m")
-        ax.set_ylabel("critical slope, N·m·s/rad")
+            between = slope.per_si * np.array(self.between)
+            ax.plot(
+                0.5 * (depths[1:] + depths[:-1]),
+                between,
+                "x",
+                color=GREY,
+                label="all modes, law held to there",
+            )
+        ax.set_xlabel(f"length of the string, {deep.unit}")
+        ax.set_ylabel(f"critical slope, {slope.unit}")
         ax.set_ylim(bottom=0.0)
         ax.legend(fontsize=8)
         return figure

@@ -17,6 +17,7 @@ from drillctrl.strings.drive_design import dynamic_drive_control
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drive_observer import observer_drive_control
 from drillctrl.strings.drive_rules import RULES, pi_control, rule_control
+from drillctrl.strings.drive_tuned import TUNED, tuned_z_torque
 from drillctrl.strings.drives_words import comparison_summary
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _DYNAMIC = tuple(f"dynamic-{n}" for n in range(5))
 _OBSERVERS = tuple(f"observer-{n}" for n in range(1, 4))
-DRIVE_NAMES = (*RULES, *_OBSERVERS, *_DYNAMIC)
+DRIVE_NAMES = (*RULES, TUNED, *_OBSERVERS, *_DYNAMIC)
 _MODES = 4
 
 
@@ -111,8 +112,8 @@ def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> Drive
     Parameters
     ----------
     name : str
-        A rule as of `rule_control`, ``"observer-1"`` to ``"observer-3"``, or ``"dynamic-0"`` to
-        ``"dynamic-4"``.
+        A rule as of `rule_control`, ``"z-torque-tuned"``, ``"observer-1"`` to ``"observer-3"``,
+        or ``"dynamic-0"`` to ``"dynamic-4"``.
     rig : StringRig
         With a top drive.
     length_error : float
@@ -127,6 +128,8 @@ def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> Drive
     if name in _DYNAMIC:
         order = int(name[-1])
         return dynamic_drive_control(rig.string.torsion, machine, order, length_error)
+    if name == TUNED:
+        return tuned_z_torque(rig.string.torsion, machine)
     if name in _OBSERVERS:
         return observer_drive_control(rig.string.torsion, machine, int(name[-1]))
     if name not in RULES:

@@ -52,6 +52,7 @@ PARTS: dict[str, dict[str, Dimension | None]] = {
         "lag": units.TIME,
         "encoder": units.TIME,
         "torque_filter": units.TIME,
+        "encoder_counts": None,
     },
     "damping": {"torsional": units.RATE, "axial": units.RATE, "kelvin_voigt": units.TIME},
     "mud": {"density": units.DENSITY},
@@ -64,7 +65,7 @@ PARTS: dict[str, dict[str, Dimension | None]] = {
 # What may be left out: whole tables, and keys of tables.
 _OPTIONAL_PARTS = ("top_drive", "damping", "mud", "hoisting")
 _OPTIONAL = (
-    *("torque_limit", "delay", "lag", "encoder", "torque_filter"),
+    *("torque_limit", "delay", "lag", "encoder", "torque_filter", "encoder_counts"),
     *("torsional", "axial", "kelvin_voigt"),
     *("stiffness", "block_mass", "feed_gain"),
 )

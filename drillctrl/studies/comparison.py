@@ -21,10 +21,10 @@ from drillctrl.robustness.margins import DelayMargin, ParameterMargin
 from drillctrl.robustness.radius import StabilityRadius
 from drillctrl.robustness.transfer import frequency_grid, loop_transfer
 from drillctrl.studies.comparison_text import (
-    LEGEND,
     cells,
     comparison_text,
     headings,
+    legend,
     sentences,
 )
 from drillctrl.studies.measures import Response
@@ -231,7 +231,7 @@ class Comparison:
             disturbance=", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items()),
             headings=headings(self.case),
             rows=[(row["label"], row["stable"], cells(row, self.case)) for row in rows],
-            legend=LEGEND,
+            legend=legend(self.case),
             sentences=sentences(rows),
             gains=[
                 (
@@ -252,7 +252,7 @@ class Comparison:
         """Say where the candidates were compared."""
         point = self._operating_point()
         groups = f"ω0 = {point.omega0:.6g}, δ0 = {point.delta0:.6g}, ψ = {point.psi:.6g}"
-        return groups if self.case.told_rig is None else f"{self.case.place} ({groups})"
+        return groups if self.case.told_rig is None else self.case.place
 
     def _gain_texts(self) -> dict[str, dict[str, str]]:
         """Return K1 and K2 by label, in a rig's units where there is one."""

@@ -31,6 +31,8 @@ COLUMNS = (
     ("torsion", "torsional_growth", "{:.3g}"),
     ("trials", "recommended", "{}"),
 )
+# Headings where a rig was given.
+_OF_RIG = {"α": "growth", "Δψ": "Δrock"}
 # What columns with a unit measure; of a rig they are told in its units.
 _QUANTITIES = {
     "max_abs_u": "torque",
@@ -67,10 +69,19 @@ def _scale(name: str, case: Case) -> tuple[float, str]:
 def headings(case: Case) -> list[str]:
     """Return the heads of the columns, with units where there is a rig."""
     units = [_scale(name, case)[1] for _, name, _ in COLUMNS]
+    words = {} if case.told_rig is None else _OF_RIG
     return [
-        f"{heading}, {unit}" if unit else heading
+        f"{words.get(heading, heading)}, {unit}" if unit else words.get(heading, heading)
         for (heading, _, _), unit in zip(COLUMNS, units, strict=True)
     ]
+
+
+def legend(case: Case) -> str:
+    """Return what the columns are."""
+    if case.told_rig is None:
+        return LEGEND
+    growth = "growth: of the slowest vibration, which dies away below 0"
+    return LEGEND.replace("α: spectral abscissa", growth).replace("Δψ", _OF_RIG["Δψ"])
 
 
 def cells(fields: Fields, case: Case) -> list[str]:
@@ -124,7 +135,7 @@ def comparison_text(
     for text in sentences(rows):
         lines.append(wrapped(text))
     lines.append("")
-    lines.append(wrapped(LEGEND))
+    lines.append(wrapped(legend(case)))
     return "\n".join(lines)
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,11 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.files import replacing
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.templates import filled
-from drillctrl.strings.drive_sampled import DRIVE_BITS, SampledDrive
-from drillctrl.tables.export_c import check_c_header, check_c_name
+from drillctrl.strings.drive_sampled import DRIVE_AXES, DRIVE_BITS, SampledDrive
+from drillctrl.tables.bench_st import bench_name, bench_text
+from drillctrl.tables.drive_arithmetic import float_words, in_float
+from drillctrl.tables.drive_vectors import DriveVectors, drive_vectors
+from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
 from drillctrl.tables.export_fmu import check_fmu, write_fmu
 from drillctrl.tables.export_st import DIALECTS, with_marks
 from drillctrl.tables.fmu_description import Variable
@@ -22,28 +27,41 @@ from drillctrl.tables.reserved import is_identifier
 ENDINGS = (".c", ".st", ".scl", ".xml", ".fmu")
 # What the block declares, so that its own name is none of these.
 _VARIABLES = """
-    MeasuredSpeed WantedSpeed GivenTorque StringDepth Enable TighterLimit ElapsedTime
+    MeasuredSpeed WantedSpeed GivenTorque StringDepth RotarySpeed RockStrength MudDensity
+    Enable TighterLimit ElapsedTime
     TorqueCommand Vouched StatusBits LawStates MovedStates GoodSpeed GoodWanted GoodTorque
-    GoodDepth SlowSpeed SlowTorque SpeedBefore ErrorBefore SpeedError PipeTorque LawValue
+    GoodDepth GoodRotary GoodStrength GoodDensity
+    SlowSpeed SlowTorque SpeedBefore ErrorBefore SpeedError PipeTorque LawValue
     ValueBefore LawIntegral IntegralChange StartTorque WantedTorque HeldTorque BeyondTorque
     LimitNow RampShare SumOfStates LawNow LawBefore RowIndex EntryIndex ActiveSamples
     MissingSamples EqualSamples TrustSamples ReleaseSamples SampleSeen SampleGood SampleEqual
     SampleLost SampleLate SignalFrozen SignalTrusted TorqueFollowed SamplePeriod TorqueLimit
-    MostIntegral LowestDepth HighestDepth LargestSpeed LargestGiven LargestDepth
+    MostIntegral LargestSpeed LargestGiven
     LargestTorque SpeedToTorque SpeedKept SpeedTaken TorqueKept TorqueTaken
     RampSamples FadeSamples HoldSamples FrozenSamples
     FastestChange LawEdges AtRest ByInput ByState FromInput FromState IntegralGain
 """
 VARIABLES = frozenset(_VARIABLES.split())
+# Of each axis what it is called in Structured Text, and the last good one.
+_WORDS = {
+    "depth": ("StringDepth", "GoodDepth"),
+    "rotary_speed": ("RotarySpeed", "GoodRotary"),
+    "rock_strength": ("RockStrength", "GoodStrength"),
+    "mud": ("MudDensity", "GoodDensity"),
+}
 
 
 @checks_kinds
-def export_drive(law: SampledDrive, path: str | Path, *, fmi: str = "3.0") -> Path:
+def export_drive(
+    law: SampledDrive, path: str | Path, *, fmi: str = "3.0", real: str = "double"
+) -> Path:
     """Write the law of a top drive as source for its controller.
 
     All languages compute what `SteppedDrive` does: the law by the trapezoidal rule, an integral
     that neither winds up at the limits of torque and rate nor bumps when the law takes over, from
-    others or from that of another depth, and a torque that falls where signals are lost or frozen.
+    others or from that of another place, and a torque that falls where signals are lost or frozen.
+    Beside a function block stand ``NAME.vectors.csv``, samples that go in and what has to come
+    out, and for .st ``NAME_bench.st``, a program that replays them; an .xml holds both.
 
     Parameters
     ----------
@@ -54,6 +72,8 @@ def export_drive(law: SampledDrive, path: str | Path, *, fmi: str = "3.0") -> Pa
         (PLCopen) or ``.fmu`` (for co-simulation); its name is that of function, block or model.
     fmi : {"3.0", "2.0"}
         Version of the standard of an .fmu.
+    real : {"double", "float"}
+        Arithmetic of a .c; the header says by how much float differs at most.
 
     Raises
     ------
@@ -63,10 +83,13 @@ def export_drive(law: SampledDrive, path: str | Path, *, fmi: str = "3.0") -> Pa
         If a file cannot be written.
     """
     check_drive_path(path, fmi)
+    check_real(real)
     where = Path(path)
+    if real != "double" and where.suffix.lower() != ".c":
+        raise InputError("real", real, "double but in a .c")
     ending = where.suffix.lower()
     if ending == ".c":
-        _write_c(law, where.parent, where.stem)
+        _write_c(law, where.parent, where.stem, real)
     elif ending == ".fmu":
         _write_fmu(law, where, fmi)
     else:
@@ -79,10 +102,18 @@ def export_drive(law: SampledDrive, path: str | Path, *, fmi: str = "3.0") -> Pa
         )
         if ending == ".scl":
             text = with_marks(text, VARIABLES)
-        elif ending == ".xml":
-            text = plcopen_text(where.stem, [text])
-        with replacing(where) as file:
-            file.write(text.encode("utf-8"))
+        vectors = drive_vectors(law)
+        texts = {where: text}
+        if ending != ".scl":
+            bench = where.with_name(f"{bench_name(where.stem)}.st")
+            texts[bench] = _bench(law, where.stem, vectors)
+        if ending == ".xml":
+            texts = {where: plcopen_text(where.stem, list(texts.values()))}
+        texts[where.with_suffix(".vectors.csv")] = vectors.csv()
+        with contextlib.ExitStack() as stack:
+            # All of them or none.
+            for target, written in texts.items():
+                stack.enter_context(replacing(target)).write(written.encode("utf-8"))
     return where
 
 
@@ -97,13 +128,36 @@ def check_drive_path(path: str | Path, fmi: str = "3.0") -> None:
         check_c_header(where.with_suffix(".h"))
     elif ending == ".fmu":
         check_fmu(where.stem, fmi)
-    elif not is_identifier(where.stem) or where.stem.upper() in {v.upper() for v in VARIABLES}:
+    elif not all(
+        map(is_identifier, (where.stem, bench_name(where.stem)))
+    ) or where.stem.upper() in {v.upper() for v in VARIABLES}:
         wanted = "an identifier of at most 32 characters that is no word of Structured Text"
         raise InputError("name", where.stem, f"{wanted} or its libraries, such as soft_torque")
 
 
-def _write_c(law: SampledDrive, folder: str | Path, name: str) -> None:
-    words = _words(law, name, "{:.17e}")
+def _bench(law: SampledDrive, name: str, vectors: DriveVectors) -> str:
+    targets = ["MeasuredSpeed", "WantedSpeed", "GivenTorque", *(_WORDS[n][0] for n, _ in law.axes)]
+    inputs = {target: f"Motion{target}" for target in targets}
+    columns = {
+        **dict(zip(inputs.values(), vectors.inputs.T, strict=True)),
+        "MotionEnables": vectors.enable,
+        "MotionLimits": vectors.limit,
+        "MotionTimes": vectors.elapsed,
+        "WantedCommands": vectors.command,
+        "WantedVouched": vectors.vouched,
+        "WantedStates": vectors.status,
+    }
+    given = {
+        "Enable": "MotionEnables",
+        "TighterLimit": "MotionLimits",
+        "ElapsedTime": "MotionTimes",
+    }
+    return bench_text(name, columns, {}, {**inputs, **given}, "TorqueCommand", law.limit, "N m")
+
+
+def _write_c(law: SampledDrive, folder: str | Path, name: str, real: str = "double") -> None:
+    words = _words(law, name, "{:.17e}" if real == "double" else "{:.9e}")
+    words["rounding"] = float_words(law) if real == "float" else []
     labels = {
         "LawEdges": "edges", "AtRest": "at_rest", "ByInput": "by_input", "ByState": "by_state",
         "FromInput": "from_input", "FromState": "from_state", "IntegralGain": "gain",
@@ -113,6 +167,7 @@ def _write_c(law: SampledDrive, folder: str | Path, name: str) -> None:
         for template in ("drive.h.j2", "drive.c.j2"):
             target = Path(folder) / f"{name}.{template.split('.')[1]}"
             text = filled("drillctrl.tables", template, **words)
+            text = text if real == "double" else in_float(text)
             stack.enter_context(replacing(target)).write(text.encode("ascii"))
 
 
@@ -120,7 +175,8 @@ def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
     """Return what the templates name; numbers in the form of the language."""
     number = form.format
     arrays = {
-        "LawEdges": law.edges or (0.0,),
+        # An array of no elements is not Structured Text.
+        **({"LawEdges": [edge for edges in law.edges for edge in edges]} if any(law.edges) else {}),
         "AtRest": [v for node in law.nodes for v in node.E.ravel().tolist()],
         "ByInput": [v for node in law.nodes for v in node.D.tolist()],
         "ByState": [v for node in law.nodes for v in node.C.tolist()],
@@ -138,8 +194,7 @@ def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
         "period": number(law.period),
         "limit": number(law.limit),
         "most": number(law.most),
-        "lowest": number(law.ends[0]),
-        "highest": number(law.ends[1]),
+        "axes": _axes(law, number),
         "largest": [number(value) for value in law.largest],
         "filters": [number(value) for value in (stiff, kept, new, held, 1.0 - held)],
         "rate": "" if law.rate is None else number(law.rate),
@@ -154,11 +209,33 @@ def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
     }
 
 
+def _axes(law: SampledDrive, number: Callable[[float], str]) -> list[dict[str, Any]]:
+    """Return what the templates name of each axis."""
+    found, offset = [], 0
+    for k, ((name, values), (low, high)) in enumerate(zip(law.axes, law.ends, strict=True)):
+        unit, most, told = DRIVE_AXES[name]
+        word, good = _WORDS[name]
+        found.append(
+            {
+                **{"name": name, "word": word, "good": good, "unit": unit, "told": told},
+                **{"count": len(values), "offset": offset, "input": 3 + k},
+                **{"low": number(low), "high": number(high), "largest": number(most)},
+            }
+        )
+        offset += len(values) - 1
+    return found
+
+
 def drive_words(law: SampledDrive) -> list[str]:
-    """Say in lines what the law is, at each depth, in ASCII."""
+    """Say in lines what the law is, at each place, in ASCII."""
     lines = [f"{law.name}, on a drive of {law.machine.inertia:g} kg m2"]
-    for depth, words in zip(law.depths, law.words, strict=True):
-        place = f"{depth:g} m: " if len(law.depths) > 1 else ""
+    varying = [
+        [f"{value:g} {DRIVE_AXES[name][0]}" if len(values) > 1 else "" for value in values]
+        for name, values in law.axes
+    ]
+    for at, words in zip(itertools.product(*varying), law.words, strict=True):
+        place = ", ".join(filter(None, at))
+        place += ": " if place else ""
         plain = words.replace("·", " ").replace("²", "2").replace("−", "-")
         lines += textwrap.wrap(place + plain.encode("ascii", "replace").decode(), 76)
     return lines
@@ -182,9 +259,7 @@ def _care(law: SampledDrive) -> list[str]:
 
 
 def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
-    limit, (low, high) = law.limit, law.ends
-    depth = law.depths[0]
-    ranged = {} if len(law.depths) == 1 else {"low": low, "high": high}
+    limit = law.limit
     status = "sum of " + "; ".join(f"{value}: {words}" for _, value, words in DRIVE_BITS)
 
     def given(name: str, text: str, unit: str, start: str = "0.0", **more: Any) -> Variable:
@@ -195,7 +270,11 @@ def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
         given("speed", "measured speed of the drive", "rad/s"),
         given("set_point", "speed that is wanted", "rad/s"),
         given("torque", "what the drive gave since the last sample", "N.m"),
-        given("depth", "length of the string, which picks the law", "m", repr(depth), **ranged),
+        *(
+            given(name, f"{DRIVE_AXES[name][2]}, which picks the law", DRIVE_AXES[name][0],
+                  repr(values[0]), **({"low": low, "high": high} if len(values) > 1 else {}))
+            for (name, values), (low, high) in zip(law.axes, law.ends, strict=True)
+        ),
         Variable("limit", "Float64", "parameter", "tunable", repr(limit),
                  "largest magnitude of the torque", "N.m", 0.0, limit),
         Variable("period", "Float64", "local", "constant", repr(law.period),
@@ -204,7 +283,7 @@ def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
                  -limit, limit),
         Variable("enable", "Boolean", "input", "discrete", "false", "whether it is switched on"),
         Variable("vouched", "Boolean", "output", "discrete", "false",
-                 "whether there is a law for the depth"),
+                 "whether there is a law for the place"),
         Variable("status", "Int32", "output", "discrete", "0", status, "", 0, 255),
     ]  # fmt: skip
     words = " ".join(drive_words(law))
@@ -217,5 +296,5 @@ def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
         text=f"Control of a top drive. Law: {words}.",
         stamp=law.stamp,
         period=law.period,
-        arguments=", ".join(f"data->number[{i}u]" for i in range(1, 5)),
+        arguments=", ".join(f"data->number[{i}u]" for i in range(1, 4 + len(law.axes))),
     )

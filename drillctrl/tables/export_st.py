@@ -13,6 +13,7 @@ from drillctrl.base.files import replacing
 from drillctrl.base.templates import filled
 from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.drilling.quantities import SI_UNITS
+from drillctrl.tables.bench_st import bench_name, bench_text
 from drillctrl.tables.gain_table import GainTable
 from drillctrl.tables.plcopen import plcopen_text
 from drillctrl.tables.recorded import RecordedMotion
@@ -100,11 +101,6 @@ def export_st(
     return Path(path)
 
 
-def bench_name(name: str) -> str:
-    """Return the name of the program that tests a block."""
-    return f"{name[:26].rstrip('_')}_bench"
-
-
 def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
     settings = controller.settings
     structure, plant, rig = table.structure, table.grid.plant, table.grid.rig
@@ -153,33 +149,33 @@ def _block(table: GainTable, controller: SampledController, scl: bool) -> str:
 def _bench(table: GainTable, controller: SampledController, vectors: Vectors) -> str:
     name, structure, rig = str(controller.words["name"]), table.structure, table.grid.rig
     quantity = table.grid.plant.quantity(structure.inputs[0])
-    columns: list[tuple[str, str, list[str]]] = [
-        (label, "LREAL", [_number(value) for value in values.ravel().tolist()])
-        for label, values in (
-            ("MotionValues", vectors.outputs),
-            ("MotionPlaces", vectors.places),
-            ("MotionDelays", vectors.delay),
-            ("MotionTimes", vectors.elapsed),
-            ("MotionOthers", vectors.other),
-            ("MotionLimits", vectors.limit),
-            ("WantedCommands", vectors.command),
-        )
-    ]
-    for label, flags in (("MotionEnables", vectors.enable), ("WantedVouched", vectors.vouched)):
-        columns.append((label, "BOOL", [str(flag).upper() for flag in flags.tolist()]))
-    columns.append(("WantedStates", "DINT", [str(value) for value in vectors.status.tolist()]))
-    return filled(
-        "drillctrl.tables",
-        "bench.st.j2",
-        name=name,
-        bench=bench_name(name),
-        outputs=len(structure.outputs),
-        rows=len(vectors.command),
-        columns=columns,
-        tolerance=_number(1e-9 * controller.settings.limit),
-        command_unit="in units of the torsional stiffness"
-        if rig is None
-        else SI_UNITS[quantity].replace("·", " "),
+    unit = "in units of the torsional stiffness"
+    columns = {
+        "MotionValues": vectors.outputs,
+        "MotionPlaces": vectors.places,
+        "MotionDelays": vectors.delay,
+        "MotionTimes": vectors.elapsed,
+        "MotionOthers": vectors.other,
+        "MotionLimits": vectors.limit,
+        "MotionEnables": vectors.enable,
+        "WantedCommands": vectors.command,
+        "WantedVouched": vectors.vouched,
+        "WantedStates": vectors.status,
+    }
+    return bench_text(
+        name,
+        columns,
+        {"Measured": "MotionValues", "Place": "MotionPlaces"},
+        {
+            "DelayTime": "MotionDelays",
+            "Enable": "MotionEnables",
+            "TighterLimit": "MotionLimits",
+            "ElapsedTime": "MotionTimes",
+            "OtherCommand": "MotionOthers",
+        },
+        "Command",
+        controller.settings.limit,
+        unit if rig is None else SI_UNITS[quantity].replace("·", " "),
     )
 
 

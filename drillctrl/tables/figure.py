@@ -13,6 +13,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.base.figure import axis_name, new_figure
+from drillctrl.base.language import SI, Language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.tables.grid import Axis, Grid
 from drillctrl.tables.interpolation import CONSTANT, UNSAFE, BoolArray, Cells, cell_shape
@@ -32,9 +33,9 @@ _NAMES = {
 }
 
 
-def axis_label(axis: Axis) -> str:
+def axis_label(axis: Axis, language: Language = SI) -> str:
     """Return name and unit of an axis for a figure."""
-    unit, _ = axis.field_unit
+    unit, _ = axis.told(language)
     name = _NAMES.get(axis.name, axis.name.replace("_", " "))
     return axis_name(name, unit)
 
@@ -54,6 +55,10 @@ class Drawn(NamedTuple):
         What is known between the nodes.
     constant : array, (c, 2 m p)
         The entries in the cells whose gains are constant.
+    units : tuple of str
+        Of the entries; none without a rig.
+    language : Language
+        Of the axes.
     """
 
     grid: Grid
@@ -63,6 +68,17 @@ class Drawn(NamedTuple):
     stable: BoolArray
     cells: Cells
     constant: FloatArray
+    units: tuple[str, ...] = ()
+    language: Language = SI
+
+    @property
+    def growth(self) -> tuple[str, str, str]:
+        """Title, label and unit of the growth rates."""
+        return ("growth", "growth rate", "1/s") if self.units else ("α", "α", "")
+
+    def gain(self, column: int) -> str:
+        """Label of an entry."""
+        return axis_name("gain", self.units[column] if self.units else "")
 
 
 def plot_table(table: Drawn) -> Figure:
@@ -85,13 +101,18 @@ def plot_table(table: Drawn) -> Figure:
     rows = math.ceil(len(panels) / columns)
     figure = new_figure(max(4.0 * columns, 6.5), 3.3 * rows + 0.4)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    held = [axis.text(*axis.values) for axis in table.grid.axes if len(axis.values) == 1]
+    held = [
+        axis.text(*axis.values, language=table.language)
+        for axis in table.grid.axes
+        if len(axis.values) == 1
+    ]
     for ax, (title, draw) in zip(axes, panels, strict=False):
         draw(ax)
         ax.set_title(title)
     for ax in axes[len(panels) :]:
         ax.set_axis_off()
-    marks = "× not stable or refused, //// not vouched for, · constant gains"
+    cells = "did not pass" if table.units else "not vouched for"
+    marks = f"× not stable or refused, //// {cells}, · constant gains"
     figure.suptitle(f"{table.structure.name}, {', '.join([*held, marks])}", fontsize="medium")
     return figure
 
@@ -100,9 +121,11 @@ def _panels(table: Drawn) -> list[Panel]:
     free = table.structure.spread.any(axis=1)
     names = np.array(table.structure.entry_names)[free].tolist()
     fields = dict(zip(names, table.entries.T[free], strict=True))
+    title, *_ = table.growth
+    labels = [table.gain(k) for k in np.flatnonzero(free).tolist()]
     grid = table.grid
     if len(grid.points) == 1:
-        fields["α"] = table.spectral_abscissa
+        fields[title] = table.spectral_abscissa
         return [("one node", functools.partial(_values, fields))]
     if sorted(grid.shape)[1] == 1:
         along = int(np.argmax(grid.shape))
@@ -110,22 +133,25 @@ def _panels(table: Drawn) -> list[Panel]:
             (name, functools.partial(_line, table, along, column))
             for name, column in zip(names, np.flatnonzero(free).tolist(), strict=True)
         ]
-        return [*lines, ("α", functools.partial(_line, table, along, None))]
+        return [*lines, (title, functools.partial(_line, table, along, None))]
     # Of equally short axes the last.
     across = 2 - int(np.argmin(grid.shape[::-1]))
     depth, third = grid.shape[across], grid.axes[across]
     maps: list[Panel] = [
         (
-            name if depth == 1 else f"{name} at {third.text(third.values[depth // 2])}",
-            functools.partial(_map, table, across, depth // 2, values, "viridis"),
+            name
+            if depth == 1
+            else f"{name} at {third.text(third.values[depth // 2], language=table.language)}",
+            functools.partial(_map, table, across, depth // 2, values, "viridis", label),
         )
-        for name, values in fields.items()
+        for (name, values), label in zip(fields.items(), labels, strict=True)
     ]
     shown = np.unique(np.linspace(0, depth - 1, min(depth, _MOST_LAYERS)).round().astype(int))
     for layer in shown.tolist():
-        title = "α" if depth == 1 else f"α at {third.text(third.values[layer])}"
-        alpha = table.spectral_abscissa
-        maps.append((title, functools.partial(_map, table, across, layer, alpha, "RdBu_r")))
+        at = third.text(third.values[layer], language=table.language)
+        alpha, label = table.spectral_abscissa, axis_name(*table.growth[1:])
+        draw = functools.partial(_map, table, across, layer, alpha, "RdBu_r", label)
+        maps.append((title if depth == 1 else f"{title} at {at}", draw))
     return maps
 
 
@@ -138,7 +164,7 @@ def _values(fields: dict[str, FloatArray], ax: Axes) -> None:
 def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
     """Draw an entry of (K1, K2), or α for None, over the one axis that there is."""
     axis = table.grid.axes[along]
-    x = np.array(axis.values) * axis.field_unit[1]
+    x = np.array(axis.values) * axis.told(table.language)[1]
     values = table.spectral_abscissa if column is None else table.entries[:, column]
     constant = table.cells.mode == CONSTANT
     if column is None:
@@ -157,11 +183,19 @@ def _line(table: Drawn, along: int, column: int | None, ax: Axes) -> None:
         for i in np.flatnonzero(table.cells.mode == kind).tolist():
             ax.axvspan(x[i], x[i + 1], fill=False, hatch=hatch, linewidth=0.0, alpha=0.4)
     ax.scatter(x[~table.stable], values[~table.stable], marker="x", c="black", zorder=3)
-    ax.set_xlabel(axis_label(axis))
-    ax.set_ylabel(axis_name("α" if column is None else "gain"))
+    ax.set_xlabel(axis_label(axis, table.language))
+    ax.set_ylabel(axis_name(*table.growth[1:]) if column is None else table.gain(column))
 
 
-def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str, ax: Axes) -> None:
+def _map(
+    table: Drawn,
+    across: int,
+    layer: int,
+    values: FloatArray,
+    colours: str,
+    label: str,
+    ax: Axes,
+) -> None:
     """Draw values over two axes at one value of the third."""
     from matplotlib.patches import Rectangle
 
@@ -171,14 +205,17 @@ def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str
     def cut(given: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return np.asarray(np.take(given.reshape(grid.shape), layer, axis=across))
 
-    x, y = (np.array(axis.values) * axis.field_unit[1] for axis in (grid.axes[down], grid.axes[up]))
+    x, y = (
+        np.array(axis.values) * axis.told(table.language)[1]
+        for axis in (grid.axes[down], grid.axes[up])
+    )
     # Colours for α are white at 0.
     reach = float(np.abs(values).max()) if colours == "RdBu_r" else None
     low = None if reach is None else -reach
     picture = ax.pcolormesh(
         x, y, cut(values).T, shading="nearest", cmap=colours, vmin=low, vmax=reach
     )
-    ax.figure.colorbar(picture, ax=ax, label=axis_name("α" if reach else "gain"))
+    ax.figure.colorbar(picture, ax=ax, label=label)
     stable = cut(table.stable)
     at_x, at_y = np.meshgrid(x, y, indexing="ij")
     ax.scatter(at_x[~stable], at_y[~stable], marker="x", c="black", s=18, linewidths=0.9)
@@ -190,5 +227,5 @@ def _map(table: Drawn, across: int, layer: int, values: FloatArray, colours: str
         for i, j in np.argwhere(mode == kind).tolist():
             size = x[i + 1] - x[i], y[j + 1] - y[j]
             ax.add_patch(Rectangle((x[i], y[j]), *size, fill=False, hatch=hatch, linewidth=0.0))
-    ax.set_xlabel(axis_label(grid.axes[down]))
-    ax.set_ylabel(axis_label(grid.axes[up]))
+    ax.set_xlabel(axis_label(grid.axes[down], table.language))
+    ax.set_ylabel(axis_label(grid.axes[up], table.language))

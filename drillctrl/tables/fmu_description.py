@@ -24,6 +24,7 @@ _UNITS: dict[str, tuple[dict[str, int], tuple[str, float] | None]] = {
     "N.m": ({"kg": 1, "m": 2, "s": -2}, ("kN.m", 1e-3)),
     "Pa": ({"kg": 1, "m": -1, "s": -2}, ("MPa", 1e-6)),
     "s": ({"s": 1}, None),
+    "kg/m3": ({"kg": 1, "m": -3}, None),
 }
 
 

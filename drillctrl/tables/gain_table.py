@@ -10,8 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.language import Language, told_language
+from drillctrl.base.text import wrapped
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.drilling import Drilling
+from drillctrl.drilling.gain_units import rig_gain_units
 from drillctrl.synthesis.objectives import EXACT
 from drillctrl.tables.grid import Grid
 from drillctrl.tables.interpolation import CELL_NAMES, UNSAFE, BoolArray, Cells, interpolated, place
@@ -194,15 +197,16 @@ class GainTable:
             )
         ]
 
-    def summary(self) -> str:
-        """Return a text for people."""
+    def summary(self, units: str | None = None) -> str:
+        """Return a text for people, of a rig in ``"si"`` or ``"field"`` units."""
+        language, rig = told_language(units), self.grid.rig
         jump, between = self.jump
         axes = [
-            axis.text(axis.values[0], axis.values[-1])
+            axis.text(axis.values[0], axis.values[-1], language=language)
             + (f" ({len(axis.values)})" if len(axis.values) > 1 else "")
             for axis in self.grid.axes
         ]
-        lost = "lowest α at each node"
+        lost = f"{'fastest decay' if rig else 'lowest α'} at each node"
         if self.objective != repr(EXACT):
             lost = f"{self.objective} at each node"
         if self.give_up:
@@ -210,7 +214,8 @@ class GainTable:
         if self.on_motion:
             lost = "torsional swings on the motion that is drilled with decay soonest"
         lines = [
-            f"Gain table, structure {self.structure.name}, {len(self.gains)} nodes",
+            f"Gain table, structure {self.structure.name}, {len(self.gains)} nodes: "
+            f"{int(self.sound.sum())} of them to be used",
             f"  {', '.join(axes)}",
             f"  Choice        {lost}",
             f"  Nodes         {int(self.stable.sum())} stable, "
@@ -222,15 +227,19 @@ class GainTable:
         elif unstable:
             stated = "control off" if self.fallback == "off" else "the best gains found, unstable"
             lines.append(f"                {unstable} that nothing found stabilises: {stated}")
-        lines += self._trial_lines()
+        lines += self._trial_lines(language)
         if self.sound.any():
             alpha = self.spectral_abscissa[self.sound]
             which = "of smooth drilling" if self.on_motion else "where stable"
-            lines.append(f"  α             {alpha.min():.4g} … {alpha.max():.4g} {which}")
+            told = f"α             {alpha.min():.4g} … {alpha.max():.4g}"
+            if rig is not None:
+                low, high = alpha.min() / rig.time_scale, alpha.max() / rig.time_scale
+                told = f"Growth        {low:.4g} … {high:.4g} 1/s"
+            lines.append(f"  {told} {which}")
         if between is not None:
             ends = self.grid.coordinates[list(between)].T.tolist()
             where = [
-                axis.text(*pair)
+                axis.text(*pair, language=language)
                 for axis, pair in zip(self.grid.axes, ends, strict=True)
                 if len(axis.values) > 1
             ]
@@ -247,11 +256,14 @@ class GainTable:
                 f"  Cells         {passed} of {self.cells.mode.size} pass trial runs in the middle"
             )
         elif self.worst_abscissa is not None:
-            worst = f"{self.worst_abscissa:.4g}"
-            lines.append(f"                worst α found where vouched for: {worst}")
-        return "\n".join(lines)
+            worst = f"worst α found where vouched for: {self.worst_abscissa:.4g}"
+            if rig is not None:
+                growth = self.worst_abscissa / rig.time_scale
+                worst = f"slowest decay found in cells that passed: {-growth:.4g} 1/s"
+            lines.append(f"                {worst}")
+        return "\n".join(wrapped(line, 16) for line in lines)
 
-    def _trial_lines(self) -> list[str]:
+    def _trial_lines(self, language: Language) -> list[str]:
         """Say what trial runs showed, and why gains were refused."""
         if not self.tried:
             return ["                gains not tried on the nonlinear motion"]
@@ -261,24 +273,32 @@ class GainTable:
         lines = [f"                {len(self.refusals)} {word} by trial runs: control off"]
         for node, reason in list(self.refusals.items())[:_SHOWN]:
             place = zip(self.grid.axes, self.grid.coordinates[node].tolist(), strict=True)
-            where = ", ".join(a.text(value) for a, value in place if len(a.values) > 1)
+            where = ", ".join(
+                a.text(value, language=language) for a, value in place if len(a.values) > 1
+            )
             lines.append(f"                  {where or 'here'}: {reason}")
         hidden = len(self.refusals) - _SHOWN
         return [*lines, f"                  and {hidden} more"] if hidden > 0 else lines
 
-    def plot(self) -> Figure:
-        """Draw gains and α over the grid; see `drillctrl.tables.figure.plot_table`."""
+    def plot(self, units: str | None = None) -> Figure:
+        """Draw gains and α over the grid, of a rig in units; see `plot_table`."""
         from drillctrl.tables.figure import Drawn, plot_table
 
+        language, rig = told_language(units), self.grid.rig
+        scales = rig_gain_units(self.structure, self.grid.plant, rig) or ()
+        told = [(value, language.gain(unit.replace("*", "·"))) for value, unit in scales]
+        factors = np.array([value * gain.per_si for value, gain in told] or [1.0])
         return plot_table(
             Drawn(
                 self.grid,
                 self.structure,
-                self.entries,
-                self.spectral_abscissa,
+                factors * self.entries,
+                self.spectral_abscissa / (1.0 if rig is None else rig.time_scale),
                 self.sound,
                 self.cells,
-                self.entries_of(self.cells.gains),
+                factors * self.entries_of(self.cells.gains),
+                tuple(gain.unit for _, gain in told),
+                language,
             )
         )
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import FIELD, SI, Language
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
@@ -44,6 +45,14 @@ FIELD_UNITS = {
     "rock_strength": ("MPa", 1e-6),
     "depth": ("m", 1.0),
     "mud": ("sg", 1e-3),
+}
+_QUANTITIES = {
+    "rotary_speed": "angular_rate",
+    "penetration_rate": "axial_rate",
+    "weight_on_bit": "force",
+    "rock_strength": "stress",
+    "depth": "depth",
+    "mud": "density",
 }
 # Groups that further axes may go over, and how many axes there may be: a cell has 2^a corners.
 FURTHER = ("eta", "xi", "kappa", "beta")
@@ -91,11 +100,17 @@ class Axis:
     @property
     def field_unit(self) -> tuple[str, float]:
         """Unit that a driller reads, empty for a plain number, and how many are one SI unit."""
+        return self.told()
+
+    def told(self, language: Language = SI) -> tuple[str, float]:
+        """Return `field_unit` in a language; mud in SI is told by its specific gravity."""
+        if language is FIELD and self.name in _QUANTITIES:
+            return language.units[_QUANTITIES[self.name]]
         return FIELD_UNITS.get(self.name, ("", 1.0))
 
-    def text(self, *values: float) -> str:
+    def text(self, *values: float, language: Language = SI) -> str:
         """Return a value, or the ends of a range, with name and unit for people."""
-        unit, factor = self.field_unit
+        unit, factor = self.told(language)
         numbers = " … ".join(f"{factor * value:.4g}" for value in dict.fromkeys(values))
         return f"{self.name.replace('_', ' ')} {numbers} {unit}".strip()
 

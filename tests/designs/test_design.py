@@ -64,8 +64,10 @@ def test_rig_points_are_reported_in_rig_units():
     for part in ("150 rpm", "20 m/h", "kN on bit", "kN·m on bit", "N·m/rad", "N·m·s/rad", " s"):
         assert part in text
     assert "stabilised" in text
-    assert "u = K1·(θ, θ') + K2·(the same, τ0 ago)" in text
-    assert "ψ between" in report(result).summary()
+    assert "torque = K1·(its angle, its speed) + K2·(the same, one delay ago)" in " ".join(
+        text.split()
+    )
+    assert "rock strength between" in report(result).summary()
     rig = result.to_dict()["rig"]
     stiffness, time = rig_point.rig.torsional_stiffness, rig_point.rig.time_scale
     assert rig["K1"] == pytest.approx(

@@ -31,6 +31,7 @@ from drillctrl import (
     torsional_threshold,
 )
 from drillctrl.drilling.case import as_case
+from drillctrl.motion import response
 from drillctrl.motion.along_report import along_fields, along_summary
 from drillctrl.motion.report import motion_fields
 from drillctrl.motion.torsion import forced_speed, ripple_of
@@ -366,3 +367,38 @@ def test_speeds_between_which_swings_decay(monkeypatch):
         run = simulate(point, duration=81.0, initial={"dx": 0.1, "dtheta": speed})
         _, swings = swing_of(run, 10.0, 80.0)
         assert (swings[-1] > swings[0]) == grows
+
+
+def test_answers_are_kept_by_what_computed_them(tmp_path, monkeypatch):
+    """Other arguments, other sources and a file that was cut short are none of them."""
+    where = OperatingPoint(10.0, 1.75, 14.0)
+
+    def ask(amplitude=0.1, **options):
+        return bit_response(where, 1.0, amplitude, most_periods=40, keep=tmp_path, **options)
+
+    first = ask()
+    (kept,) = tmp_path.iterdir()
+    calls = []
+    real = response._measured
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(response, "_measured", counted)
+    again = ask()
+    assert not calls
+    assert (again.value, again.error, again.periods) == (first.value, first.error, first.periods)
+    assert np.array_equal(again.windows, first.windows)
+    ask(0.11)
+    ask(rtol=1e-6)
+    assert len(calls) == 2
+    kept.write_bytes(kept.read_bytes()[:-9])
+    assert ask().value == first.value
+    assert len(calls) == 3
+    monkeypatch.setattr("drillctrl.base.checkpoint.source_digest", lambda: "other sources")
+    assert ask().value == first.value
+    assert len(calls) == 4
+    assert len(list(tmp_path.iterdir())) == 4
+    with pytest.raises(InputError, match="keep"):
+        bit_response(where, 1.0, 0.1, most_periods=40, keep=kept)

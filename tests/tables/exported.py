@@ -2,6 +2,7 @@
 
 import ctypes
 import functools
+import itertools
 import shutil
 import subprocess
 from pathlib import Path
@@ -19,6 +20,9 @@ FLAGS = (
     *("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wfloat-equal"),
     *("-Wshadow", "-Wmissing-prototypes", "-ffp-contract=off"),
 )
+
+# A library of a name that was loaded already would be taken for that one.
+SERIAL = itertools.count()
 
 # Fields of the state in C.
 COUNTS = ("newest", "active", "vouched", "status", "seen", "missing", "equal", "trust", "releasing")
@@ -52,7 +56,7 @@ class InC:
         fields += [("gains", reals * (2 * self.outputs))]
         fields += [(name, reals) for name in REALS]
         self.state = type("State", (ctypes.Structure,), {"_fields_": fields})()
-        binary = Path(folder) / f"drill_{real}_{compiler}_{id(self)}.so"
+        binary = Path(folder) / f"drill_{real}_{compiler}_{next(SERIAL)}.so"
         self.library = compiled([source], binary, *FLAGS, *flags, compiler=compiler)
         self.library.drill_step.restype = self.kind
         self.init()
@@ -175,7 +179,7 @@ class Translated:
         wrapper = Path(folder) / "wrapper.c"
         wrapper.write_text(self.WRAPPER)
         include = (f"-I{library / 'C'}", "-w", "-ffp-contract=off", f"-I{folder}")
-        self.library = compiled([wrapper], Path(folder) / f"block_{id(self)}.so", *include)
+        self.library = compiled([wrapper], Path(folder) / f"block_{next(SERIAL)}.so", *include)
         self.library.step.restype = ctypes.c_double
         self.library.start()
         self.limit, self.period, self.other = options["limit"], options["period"], 0.0

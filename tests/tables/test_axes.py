@@ -26,8 +26,10 @@ from drillctrl import (
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.plant import paper_plant
+from drillctrl.tables.export_st import export_st
 
 from .exported import InC, InPython, InScl, Interpreted, hostile
+from .iec import Block, load
 
 ENDS = {"omega0": (9, 12), "delta0": (1, 2), "psi": (12, 14)}
 AXES = tuple(linear_axis(name, *ends, 2) for name, ends in ENDS.items())
@@ -92,6 +94,15 @@ def test_exports_look_four_coordinates_up(four, tmp_path, kind):
             flat = np.concatenate([part.ravel() for part in four.gains_at(*place)])
             assert gains == pytest.approx(flat.tolist(), rel=1e-12)
             assert vouched == four.stable_at(*place)[0]
+
+
+def test_the_bench_replays_four_coordinates(four, tmp_path):
+    path = export_st(four, tmp_path / "drill.st", period=0.01, limit=1.0)
+    text = path.read_text() + (tmp_path / "drill_bench.st").read_text()
+    bench = Block(load(text)["DRILL_BENCH"])
+    for _ in range(241):
+        bench()
+    assert bench.PASSED
 
 
 def test_a_schedule_keeps_what_no_scenario_changes(four):

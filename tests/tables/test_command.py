@@ -164,3 +164,26 @@ def test_a_unit_for_co_simulation_and_what_it_does_beside_its_law(capsys, tmp_pa
     ):
         assert said in text
     assert "u changes by at most 0.3 a sample. Switched off, u falls to 0 over 4" in text
+
+
+def test_a_table_of_a_rig_is_told_in_feet_and_pounds(capsys, tmp_path):
+    axes = ("--rig", "table1", "--speed", "150:160:2 rpm", "--rop", "10:20:2 m/h")
+    more = ("--structure", "p", "--trials", "none", "--plot", tmp_path / "gains.png")
+    text = {
+        units: run(capsys, "table", *axes, *more, "--units", units)[1] for units in ("si", "field")
+    }
+    assert "10 … 20 m/h" in text["si"]
+    assert "60 MPa" in text["si"]
+    # A foot is 0.3048 m; a ksi 6.895 MPa.
+    assert f"{10 / 0.3048:.4g} … {20 / 0.3048:.4g} ft/h" in text["field"]
+    assert f"{60 / 6.894757:.4g} ksi" in " ".join(text["field"].split())
+    assert not any(word in text["field"] for word in ("α", "vouched", "m/h", "MPa"))
+    assert all(len(line) <= 80 for line in text["field"].splitlines())
+
+
+def test_units_of_a_table_need_a_rig(capsys):
+    status, _, err = run(
+        capsys, "table", "--omega0", "8:9:2", "--delta0", "1:2:2", "--units", "field"
+    )
+    assert status == 2
+    assert "--units" in err

@@ -1,7 +1,7 @@
 """Laws of a top drive: the same torque in every language, and that of the continuous law."""
 
+import csv
 import ctypes
-import itertools
 import subprocess
 import zipfile
 from dataclasses import replace
@@ -29,9 +29,10 @@ from drillctrl import (
     transfer_control,
 )
 from drillctrl.strings.drive_stepped import SteppedDrive
+from drillctrl.tables.drive_arithmetic import drive_float_difference
 from drillctrl.tables.reserved import is_identifier
 
-from .exported import FLAGS, compiled
+from .exported import FLAGS, SERIAL, compiled
 from .iec import Block, load
 
 RIG = string_preset("vertical-3000")
@@ -57,11 +58,18 @@ def laws():
         [pi_control(DRIVE, factor * PIPE, 0.0) for factor in (2.0, 3.0)], period=0.02, limit=5e3,
         depths=(1000.0, 2000.0), ramp=20,
     )  # fmt: skip
+    # As of a drive that is soft where it turns slowly and the rock is hard.
+    found["scheduled"] = sampled_drive(
+        [pi_control(DRIVE, (2.0 + 0.1 * i) * PIPE, 900.0 + 50.0 * i) for i in range(24)],
+        period=0.01, limit=8e3, ramp=9, watchdog=6,
+        axes={"rotary_speed": (6.0, 12.0, 18.0), "depth": (2000.0, 3000.0),
+              "rock_strength": (4e7, 9e7), "mud": (1000.0, 1400.0)},
+    )  # fmt: skip
     return found
 
 
-# A library of a name that was loaded already would be taken for that one.
-SERIAL = itertools.count()
+def listed(place):
+    return [place] if isinstance(place, float) else list(place)
 
 
 class InC:
@@ -72,7 +80,7 @@ class InC:
     def __init__(self, law, folder, compiler="gcc", flags=()):
         export_drive(law, Path(folder) / "drive.c")
         double, whole = ctypes.c_double, ctypes.c_int32
-        fields = [("x", double * law.order), ("good", double * 4)]
+        fields = [("x", double * law.order), ("good", double * (3 + len(law.axes)))]
         fields += [(name, double) for name in self.REALS] + [(n, whole) for n in self.COUNTS]
         fields += [("limit", double), ("elapsed", double)]
         self.state = type("State", (ctypes.Structure,), {"_fields_": fields})()
@@ -82,10 +90,10 @@ class InC:
         self.library.drive_step.restype = double
         self.library.drive_init(ctypes.byref(self.state))
 
-    def step(self, speed, set_point, torque, depth, on, **given):
+    def step(self, speed, set_point, torque, place, on, **given):
         for name, value in given.items():
             setattr(self.state, name, value)
-        values = map(ctypes.c_double, (speed, set_point, torque, depth))
+        values = map(ctypes.c_double, (speed, set_point, torque, *listed(place)))
         return self.library.drive_step(ctypes.byref(self.state), *values, int(on))
 
     status = property(lambda self: self.state.status)
@@ -116,9 +124,12 @@ class InST:
         names = {"limit": "TighterLimit", "elapsed": "ElapsedTime"}
         given = {names[name]: value for name, value in given.items()}
         given.setdefault("ElapsedTime", self.law.period)
+        words = {"depth": "StringDepth", "rotary_speed": "RotarySpeed",
+                 "rock_strength": "RockStrength", "mud": "MudDensity"}  # fmt: skip
+        place = {words[n]: x for (n, _), x in zip(self.law.axes, listed(depth), strict=True)}
         self.block(
-            MeasuredSpeed=speed, WantedSpeed=set_point, GivenTorque=torque, StringDepth=depth,
-            Enable=bool(on), **given,
+            MeasuredSpeed=speed, WantedSpeed=set_point, GivenTorque=torque, Enable=bool(on),
+            **place, **given,
         )  # fmt: skip
         return self.block.TORQUECOMMAND
 
@@ -134,8 +145,9 @@ def hostile(law, count, seed=0):
     """Yield what a broken encoder, clock or operator may hand to a drive."""
     rng = np.random.default_rng(seed)
     worst = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e15, -1e14, 1e12, 0.0, -0.0, 5e-324)
-    low, high = law.depths[0], law.depths[-1]
-    speed, wanted, torque, depth, on, kind = 12.0, 12.0, 5e3, 0.5 * (low + high), True, 0
+    low, high = (np.array([values[end] for _, values in law.axes]) for end in (0, -1))
+    speed, wanted, torque, place, on, kind = 12.0, 12.0, 5e3, 0.5 * (low + high), True, 0
+    wide = 0.05 * (high - low) + 0.01 * low
     for _ in range(count):
         if rng.random() < 0.08:
             kind = int(rng.integers(10))
@@ -143,10 +155,12 @@ def hostile(law, count, seed=0):
         if kind != 3:
             speed = 12.0 + 3.0 * rng.normal()
         torque += 100.0 * rng.normal()
-        depth = float(np.clip(depth + 50.0 * rng.normal(), low - 20.0, high + 20.0))
-        sample = [speed, wanted, torque, depth]
+        place = np.clip(
+            place + wide * rng.normal(size=low.size), low - 0.5 * wide, high + 0.5 * wide
+        )
+        sample = [speed, wanted, torque, *place.tolist()]
         if kind == 1:
-            sample[rng.integers(4)] = float(rng.choice(worst))
+            sample[rng.integers(len(sample))] = float(rng.choice(worst))
         elif kind == 2:
             sample[0] *= float(rng.choice((-1.0, 1.0)))
         elif kind == 4:
@@ -163,10 +177,10 @@ def hostile(law, count, seed=0):
             sample[2] = float(rng.choice((-7e4, 0.0, 7e4)))
         if kind != 8:
             given["limit"] = 1e9
-        yield *sample, on, given
+        yield *sample[:3], sample[3:], on, given
 
 
-@pytest.mark.parametrize("name", [*NAMES, "own", "resistance"])
+@pytest.mark.parametrize("name", [*NAMES, "own", "resistance", "scheduled"])
 def test_every_language_gives_the_same_torque(laws, tmp_path, name):
     law, kinds = laws[name], (InC, InST, InScl)
     reference = InPython(law, tmp_path)
@@ -181,7 +195,7 @@ def test_every_language_gives_the_same_torque(laws, tmp_path, name):
             assert u == pytest.approx(expected, rel=1e-12, abs=1e-12 * LIMIT), type(other)
             assert (other.status, other.vouched) == (reference.status, reference.vouched)
     assert largest == law.limit
-    wanted = 2 + 4 + 16 + 128 + (8 + 64 if law.rate else 0) + (len(law.depths) > 1)
+    wanted = 2 + 4 + 16 + 128 + (8 + 64 if law.rate else 0) + any(law.edges)
     assert seen & wanted == wanted
 
 
@@ -202,7 +216,7 @@ def test_ten_thousand_hostile_samples_stay_within_the_limit(laws, tmp_path, tool
         # A drive on endless pipe, from where the last sample found it.
         speed, u = 12.0, 0.0
         for _ in range(int(120.0 / law.period)):
-            u = steps.step(speed, 12.0, u, law.depths[0], True, limit=1e9)
+            u = steps.step(speed, 12.0, u, [values[0] for _, values in law.axes], True, limit=1e9)
             speed += law.period * (u - 5e3 - PIPE * (speed - 12.0)) / DRIVE.inertia
         assert steps.status == 0
         assert (speed, u) == (pytest.approx(12.0, abs=0.5), pytest.approx(5e3, rel=0.1))
@@ -379,6 +393,65 @@ def test_the_unit_is_valid_and_gives_the_same_torque(laws, tmp_path):
     assert 'unit="N.m"' in told
 
 
+@pytest.mark.parametrize("name", ["soft-torque", "scheduled", "resistance"])
+def test_vectors_are_what_the_c_answers_and_the_bench_replays_them(laws, tmp_path, name):
+    law = laws[name]
+    export_drive(law, tmp_path / "drive.st")
+    exported, seen = InC(law, tmp_path), 0
+    lines = (tmp_path / "drive.vectors.csv").read_text().splitlines()[1:]
+    rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)]
+    for row in rows:
+        place = [row[axis] for axis, _ in law.axes]
+        u = exported.step(
+            row["speed"], row["set_point"], row["torque"], place, int(row["enable"]),
+            elapsed=row["elapsed"], limit=row["limit"],
+        )  # fmt: skip
+        assert u == pytest.approx(row["u"], abs=1e-12 * law.limit)
+        assert (exported.status, exported.vouched) == (row["status"], row["vouched"])
+        seen |= exported.status
+    # All that can happen does, as far as the law knows it.
+    assert seen == 255 - 32 - (0 if law.rate else 64)
+    text = (tmp_path / "drive.st").read_text() + (tmp_path / "drive_bench.st").read_text()
+    bench = Block(load(text)["DRIVE_BENCH"])
+    for _ in range(len(rows) + 1):
+        bench()
+    assert bench.PASSED
+    assert 1e-9 * law.limit > bench.LARGESTDEVIATION
+
+
+@pytest.mark.parametrize("name", ["soft-torque", "dynamic-2", "scheduled"])
+def test_float_differs_by_no_more_than_is_stated(laws, tmp_path, name):
+    law = laws[name]
+    export_drive(law, tmp_path / "drive.c", real="float")
+    told = drive_float_difference(law)
+    assert f"{told.torque:.3g} N m" in (tmp_path / "drive.h").read_text()
+    library = compiled([tmp_path / "drive.c"], tmp_path / f"float_{next(SERIAL)}.so", *FLAGS)
+    library.drive_step.restype = ctypes.c_float
+    state, steps = ctypes.create_string_buffer(4096), SteppedDrive(law)
+    library.drive_init(state)
+    rng, worst = np.random.default_rng(0), 0.0
+    middle = [0.5 * (values[0] + values[-1]) * 1.01 for _, values in law.axes]
+    for k in range(3000):
+        sample = [
+            12.0 + 3.0 * np.sin(0.05 * k) + 0.01 * rng.normal(),
+            12.0,
+            5e3 + rng.normal(),
+            *middle,
+        ]
+        given = [float(np.float32(value)) for value in sample]
+        u = library.drive_step(state, *map(ctypes.c_float, given), 1)
+        off = abs(u - steps.step(*given[:3], given[3:]))
+        worst = max(worst, off)
+        assert off <= told.torque + (k + 1) * told.drift
+    assert worst > 0.0
+
+
+def test_float_is_refused_where_it_cannot_hold_the_law(laws, tmp_path):
+    with pytest.raises(InputError, match="float could change the torque"):
+        export_drive(laws["z-torque"], tmp_path / "drive.c", real="float")
+    assert not list(tmp_path.iterdir())
+
+
 def test_blark_takes_the_block_and_no_name_is_taken(laws, tmp_path):
     blark = pytest.importorskip("blark")
     blark.parse_source_code(export_drive(laws["own"], tmp_path / "plain.st").read_text())
@@ -389,7 +462,9 @@ def test_blark_takes_the_block_and_no_name_is_taken(laws, tmp_path):
         assert all(is_identifier(word) for word in declared)
         xml = export_drive(laws[name], tmp_path / "soft_drive.xml").read_text()
         assert 'pouType="functionBlock"' in xml
-        assert xml.count("<variable ") == len(declared)
+        block, bench = xml.split('pouType="program"')
+        assert block.count("<variable ") == len(declared)
+        assert "LargestDeviation" in bench
 
 
 @pytest.mark.parametrize(
