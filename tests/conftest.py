@@ -1,9 +1,14 @@
 """Points of the paper that several tests use, and how hypothesis draws."""
 
+import os
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 from drillctrl import OperatingPoint, design, plant_system, report
+
+# Commands that tests start need not compile the package each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.register_profile(
     "drillctrl",

@@ -1,6 +1,7 @@
 """The layout: what a module may import, so that data flows one way."""
 
 import ast
+import functools
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -48,6 +49,7 @@ def _statements(node: ast.AST, typing: bool) -> Iterator[ast.AST]:
             yield from _statements(child, typing)
 
 
+@functools.cache
 def _imports(typing: bool) -> dict[str, set[str]]:
     """Return the modules that each module of the package imports, by their dotted names."""
     names = {}

@@ -21,29 +21,7 @@ from drillctrl.synthesis.objectives import NO_REQUIREMENTS, Exact, Objective, Re
 
 @dataclass(frozen=True, eq=False)
 class AnalysisValues:
-    """What is known of a loop around one plant.
-
-    Attributes
-    ----------
-    case : Case
-        What the gains are meant for: physics, point and rig as far as they are known.
-    plant : DelaySystem
-        Its linear system, with the inputs that are driven.
-    structure : FeedbackStructure or None
-        What is fed back; None for an open loop.
-    K1, K2 : array, (m, p)
-        Gains on Y(t) and on Y(t − τ0).
-    loop, open_loop : LoopAnalysis
-        With and without the feedback.
-    spectral_radius : SpectralRadius or None
-        ρ(D) of the semi-discretised loop; None without delay.
-    modes_worse : tuple of ModeShift
-        Modes that decay more slowly with the gains than without; see `mode_shifts`.
-    verdict : Verdict
-        What trial runs on the nonlinear motion say of the gains, if there were any.
-    elapsed_seconds : float
-        Wall time.
-    """
+    """What is known of a loop around one plant; `Analysis` says what each field is."""
 
     case: Case
     plant: DelaySystem
@@ -105,25 +83,7 @@ class AnalysisValues:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DesignValues(AnalysisValues):
-    """What is known of gains that were designed.
-
-    Attributes
-    ----------
-    objective : Objective
-        What the gains minimise.
-    objective_value : float
-        Its value at the gains.
-    requirements : Requirements
-        What was required beside.
-    requirements_met : bool
-        Whether the loop fulfils them.
-    optimality : OptimalityCertificate
-        Evidence that no better gains lie within the bounds.
-    evaluations : int
-        Eigenvalue problems that the search solved.
-    on_motion : OnMotion or None
-        What the gains do on the motion that is drilled with, where that was designed for.
-    """
+    """What is known of gains that were designed; `Design` says what each field is."""
 
     objective: Objective = field(kw_only=True)
     objective_value: float = field(kw_only=True)

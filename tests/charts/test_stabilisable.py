@@ -184,7 +184,7 @@ def test_command_line(capsys, tmp_path):
     figure = tmp_path / "reach.png"
     status, out, err = run(
         capsys,
-        *("chart", "--optimise", "--structure", "p", "--x", "omega0=8:12", "--y", "delta0=0:12"),
+        *("chart", "--optimise", "--structure", "p", "--x", "omega0=9:10", "--y", "delta0=0:4"),
         *("--bound", "K1=-3:0", "--json", "--plot", figure),
     )
     assert (status, err) == (0, "")

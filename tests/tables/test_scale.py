@@ -14,7 +14,7 @@ from tests.interrupts import hears_interrupts
 
 GRID = dimensionless_grid(linear_axis("omega0", 8, 14, 3), linear_axis("delta0", 1, 6, 3), 14.0)
 # Trials are no part of a checkpoint.
-QUICK = ["table", "--omega0", "6:22:5", "--delta0", "1:11:4", "--trials", "none", "--out"]
+QUICK = ["table", "--omega0", "6:22:4", "--delta0", "1:11:3", "--trials", "none", "--out"]
 # Many nodes, the first of them soon done.
 MANY = ["table", "--omega0", "6:22:17", "--delta0", "1:11:9", "--trials", "none", "--out"]
 
