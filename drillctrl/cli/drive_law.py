@@ -118,7 +118,7 @@ def driven_run(
         if options[name] != usual:
             wanted = f"left out with --structure {structure}, a law of a top drive"
             raise InputError(f"--{name.replace('_', '-')}", options[name], wanted)
-    changed = {
+    changed: dict[str, Any] = {
         field: units.to_si(f"--{name.replace('_', '-')}", options[name], dimension)
         for name, field, dimension in (
             ("measurement_delay", "delay", units.TIME),
