@@ -118,6 +118,8 @@ def main(first: int, count: int, seconds: float, longest: float) -> int:
             continue
         try:
             kind, told = verdict(system, 1.0)
+        except KeyboardInterrupt:
+            break
         except Exception as error:
             kind, told = "silent", f"{type(error).__name__}: {error}"
         slowest = max(slowest, (time.perf_counter() - start, seed))

@@ -71,7 +71,9 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     scale = 1.0 + np.abs(s)
     # Members of a multiple root may still move about it: where Δ is singular they are it.
     still = ~done & (last < _ABOUT * scale)
-    rough = np.flatnonzero(still | (done & (last > _ROUGH_STEP * scale)))
+    # Two that have met hold each other where they are, root or not.
+    met = np.abs(gap).min(axis=1) < _ROUGH_STEP * scale
+    rough = np.flatnonzero(still | (done & (met | (last > _ROUGH_STEP * scale))))
     if rough.size:
         done[rough] = are_roots(system, s[rough])
     return s, done

@@ -86,6 +86,13 @@ def test_a_multiple_root_of_a_single_part_is_found():
         assert roots[0].residual < 1e-12
 
 
+def test_two_starts_that_meet_are_no_root():
+    """Seven states that drive one another in a row: eigenvalues of A0, none where starts met."""
+    system = agreement.random_system(34000904)
+    assert spectral_abscissa(system) == pytest.approx(-17.46160477 / 65536.0, rel=1e-8)
+    assert agreement.verdict(system, 1.0) == ("agrees", "")
+
+
 @pytest.mark.parametrize("size", [1e-200, 1.0, 1e137, 1e139, 1e150, 1e250])
 def test_bound_of_numbers_far_apart(size):
     """Of a triangular matrix it is the largest diagonal entry, however large the others."""
