@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base import units
 from drillctrl.base.text import set_out, wrapped
+from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.quantities import told_scale
 from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
@@ -99,6 +100,14 @@ def _load_lines(run: Simulation) -> list[tuple[str, str]]:
     if found.off_rock_fraction:
         lines.append(("", f"off the rock for {found.off_rock_fraction:.1%} of the time"))
     return lines
+
+
+def _drive_lines(run: Simulation) -> list[tuple[str, str]]:
+    """Say what turns a string whose drive is under no law."""
+    free = any(isinstance(block, TopDrive) for block in run.case.physics("a run")[0].blocks)
+    if run.controller is not None or not free:
+        return []
+    return [("Drive", "its torque is constant: no law was given, such as stiff")]
 
 
 def _backwards_lines(run: Simulation) -> list[tuple[str, str]]:
@@ -195,6 +204,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
     lines = [
         ("Outcome", _outcome_text(run)),
         *([] if rig is None else [("Drilling", run.case.place)]),
+        *_drive_lines(run),
         ("Point", f"ω0 = {p.omega0:.6g}, δ0 = {p.delta0:.6g}, ψ = {p.psi:.6g}"),
         ("Run", f"{run.model} model, "
          f"{_seconds(run, run.duration)}{' time units' if rig is None else ''}, {_ended(run)}"),
