@@ -137,7 +137,7 @@ def _work(connection: multiprocessing.connection.Connection) -> None:
     # An interrupt is for the page's server, which then ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Those that work for a map end with it only if it may clear up.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, _end)
     follow_parent()
     from drillctrl.explorer.answers import answer
 
@@ -147,3 +147,10 @@ def _work(connection: multiprocessing.connection.Connection) -> None:
             question = connection.recv()
             found = answer(question, lambda *told: connection.send(("told", told)))
             connection.send(("answer", found))
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+
+def _end(*_: object) -> None:
+    """End this process once: who clears up already is not ended again."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit(1)

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from drillctrl import RigPoint, analyze, table1
+from drillctrl import RigPoint, analyze, simulate, table1
 
 pytest.importorskip("tornado")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -274,6 +274,8 @@ def test_axes_of_the_chart_are_set(page):
 
 
 def test_a_simulation_and_a_map_are_started_and_downloaded(page):
+    # The simulator compiles itself once, which may take longer than a page is waited for.
+    simulate(RigPoint(table1(), 12.0, 20.0 / 3600.0), duration=1.0)
     page.select_option("#motion-kind", "kick")
     type_in(page, "#motion-duration", "20")
     page.click("#motion-start")

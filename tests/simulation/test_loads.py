@@ -63,7 +63,7 @@ def test_a_kick_below_what_is_resolved_settles():
     run = simulate(at(150, 20), duration=100.0, initial={"dx": 1e-12})
     assert run.summary.settled
     assert figures(run).outcome == "settles"
-    assert "x from 0 to 0" in simulation_summary(run)
+    assert "Axial      0 to 0 mm" in simulation_summary(run)
     # Nothing that is resolved is taken for rest.
     kicked = simulate(OperatingPoint(10.0, 2.5, 14.0), duration=5.0, initial={"dx": 1e-6})
     assert not kicked.summary.settled

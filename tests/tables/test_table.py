@@ -137,11 +137,12 @@ def test_bad_arguments(small):
 def test_figure_shows_gains_and_abscissa(on_rig):
     figure = on_rig.plot()
     titles = [ax.get_title() for ax in figure.axes]
-    assert {"K1_1", "K2_2", "α"} <= set(titles)
-    shown = next(ax for ax in figure.axes if ax.get_title() == "α")
+    assert {"K1_1", "K2_2", "growth"} <= set(titles)
+    shown = next(ax for ax in figure.axes if ax.get_title() == "growth")
     data = shown.collections[0].get_array()
     drawn = np.sort(np.ravel(data)).tolist()
-    assert drawn == pytest.approx(np.sort(on_rig.spectral_abscissa).tolist())
+    growth = np.sort(on_rig.spectral_abscissa) / on_rig.grid.rig.time_scale
+    assert drawn == pytest.approx(growth.tolist())
 
 
 def titles_of(table):
