@@ -372,7 +372,10 @@ function drawMotion(result) {
 }
 const motionOptions = () => ({ duration: Number(motionLength.input.value), start: motionStart.input.value });
 const runMotion = new Job(panels.motion, "simulate", motionJob.go, motionJob.cancel, motionJob.bar);
-motionJob.go.addEventListener("click", () => runMotion.run(motionOptions(), drawMotion));
+motionJob.go.addEventListener("click", () => {
+  follow.motion.halt();
+  runMotion.run(motionOptions(), drawMotion);
+});
 for (const made of [motionStart, motionLength])
   made.input.addEventListener("change", () => { if (followsMotion()) follow.motion.poke(); });
 // A string of pipe takes seconds to simulate: that is started by hand.

@@ -98,6 +98,11 @@ class Follower {
     this.panel.clear("");
     if (this.stop) this.stop.abort();
   }
+  // A job draws into this panel next: what was asked before it is not to come after.
+  halt() {
+    this.again = false;
+    if (this.stop) this.stop.abort();
+  }
   poke() {
     if (this.running) { this.again = true; return; }
     this.run();
