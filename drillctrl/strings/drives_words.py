@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from drillctrl.base.language import SI, Language
-from drillctrl.base.text import wrapped
+from drillctrl.base.text import WIDTH, wrapped
 from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
@@ -52,8 +52,8 @@ def comparison_summary(
     alone = ["yes" if drive.stable else "NO" for drive in drives]
     rows.append(("Stable with a free bit", alone))
     good = ["yes" if drive.verdict.recommended else "NO" for drive in drives]
-    rows.append(("Stands as much as a stiff drive", good))
-    width = max(len(label) for label, _ in rows) + 2
+    rows.append(("As good as a stiff drive", good))
+    width = max(len(label) for label, _ in rows) + 1
     columns = max(_COLUMN, *(len(name) + 2 for name in rows[0][1]))
     head = [
         wrapped(_advice(drives, falling, language)),
@@ -65,13 +65,20 @@ def comparison_summary(
         f"Threshold: for a torque that falls by {drop} over {decay:.3g} rpm.",
         "",
     ]
-    table = [
-        f"{label:<{width}}{''.join(f'{cell:>{columns}}' for cell in cells)}".rstrip()
-        for label, cells in rows
+    abreast = max(1, (WIDTH - width) // columns)
+    table: list[str] = []
+    for begin in range(0, len(drives), abreast):
+        table += [""] * bool(begin)
+        for label, cells in rows:
+            beside = "".join(f"{cell:>{columns}}" for cell in cells[begin : begin + abreast])
+            table.append(f"{label:<{width}}{beside}".rstrip())
+    laws = [
+        wrapped(f"{drive.control.name}: {_settings(drive.control, language)}", 2)
+        for drive in drives
     ]
     refused = [drive for drive in drives if not drive.verdict.recommended]
     tail = [wrapped(refusal(drive, language)) for drive in refused]
-    return "\n".join([*head, *table, *tail])
+    return "\n".join([*head, *table, "", *laws, *tail])
 
 
 def refusal(drive: DriveMeasures, language: Language = SI) -> str:
@@ -81,22 +88,26 @@ def refusal(drive: DriveMeasures, language: Language = SI) -> str:
 
 def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: Language) -> str:
     """Say what to set of the drive that stands most, and above which speed to stay with it."""
-    best = max(drives, key=lambda drive: drive.smallest_slope)
-    if not best.stable:
-        return "None of these: under each the string swings by itself."
+    good = [drive for drive in drives if drive.verdict.recommended]
+    if not good:
+        return "None of these: under each the string swings by itself or stands too little."
+    best = max(good, key=lambda drive: drive.smallest_slope)
     told = setting_sentence(best.control, language)
     speed = threshold_speed(best)
     if not math.isfinite(speed):
         return told
     others = [drive for drive in drives if drive is not best]
     beside = ", ".join(
-        f"{_rpm(threshold_speed(drive)):.3g} under {drive.control.name}"
+        f"{drive.control.name}: {_rpm(threshold_speed(drive)):.3g}"
         for drive in others
         if drive.stable and math.isfinite(threshold_speed(drive))
     )
     fall = language.text("torque", falling.drop, 3)
-    told += f" Stay above {_rpm(speed):.3g} rpm with it{f' ({beside})' if beside else ''}, if the"
-    return f"{told} bit's torque falls by {fall} as it turns faster (a guess: measure it)."
+    stay = (
+        f"Stay above {_rpm(speed):.3g} rpm with it" if speed > 0.0 else "With it any speed will do"
+    )
+    told += f" {stay}{f' ({beside})' if beside else ''}, if the bit's torque falls by {fall}"
+    return f"{told} as it turns faster (a guess: measure it)."
 
 
 def threshold_speed(drive: DriveMeasures) -> float:
@@ -152,6 +163,10 @@ def drive_settings(control: DriveControl, language: Language) -> list[tuple[str,
     if len(gains) == 2 and gains[0]:
         rows.append(("compensated inertia", language.text("inertia", -gains[0], 3)))
     return rows
+
+
+def _settings(control: DriveControl, language: Language) -> str:
+    return ", ".join(f"{name} {value}" for name, value in drive_settings(control, language))
 
 
 def setting_sentence(control: DriveControl, language: Language) -> str:
