@@ -18,7 +18,7 @@ from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drive_tuned import TUNED
 from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
-from drillctrl.strings.drives_words import law_text, refusal, setting_sentence
+from drillctrl.strings.drives_words import refusal, setting_sentence
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
 from drillctrl.strings.rig import StringRig
@@ -116,12 +116,9 @@ class DriveDesign:
             first = f"Refused: {self.drive.control.name}, {self.reason}."
         elif self.asked != self.drive.control.name:
             first += f" In trial runs it did better than {self.asked}."
-        lines = [
-            wrapped(first),
-            wrapped(f"Law in SI units: {law_text(self.drive.control)}"),
-            "",
-            self.found.summary(units),
-        ]
+        # What a comparison advises may be another than what runs bore out.
+        _, table = self.found.summary(units).split("\n\n", 1)
+        lines = [wrapped(first), "", table]
         if self.drilling is not None:
             said = self.drilling
             lines += ["", f"At the point: {self._outcome(said)}"]

@@ -166,7 +166,10 @@ def drive_settings(control: DriveControl, language: Language) -> list[tuple[str,
 
 
 def _settings(control: DriveControl, language: Language) -> str:
-    return ", ".join(f"{name} {value}" for name, value in drive_settings(control, language))
+    rows = drive_settings(control, language)
+    if language is SI or rows[0][0] != "P":
+        return law_text(control)
+    return ", ".join(f"{name} {value}" for name, value in rows)
 
 
 def setting_sentence(control: DriveControl, language: Language) -> str:
