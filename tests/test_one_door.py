@@ -112,3 +112,21 @@ def test_a_message_says_where_the_right_kind_comes_from():
     assert str(caught.value) == (
         "feedback = 'case1': must be a FeedbackStructure, such as preset_structure('case1')"
     )
+
+
+MADE = [
+    made
+    for name in drillctrl.__all__
+    if inspect.isclass(made := getattr(drillctrl, name)) and not issubclass(made, Exception)
+]
+
+
+@pytest.mark.parametrize("made", MADE, ids=lambda made: made.__name__)
+def test_public_classes_are_made_or_refuse_in_one_line(made):
+    parameters = inspect.signature(made).parameters.values()
+    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in (2, 4)]
+    for wrong in (None, object(), "x", 3.5, [1]):
+        try:
+            made(**dict.fromkeys(needed, wrong))
+        except InputError as error:
+            assert len(str(error).splitlines()) == 1

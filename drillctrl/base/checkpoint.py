@@ -12,6 +12,7 @@ from typing import Any
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import check_regular, replacing
+from drillctrl.base.kinds import makes_of_kinds
 
 _MOST_BYTES = 4_000_000_000
 _LIBRARIES = ("casadi", "numba", "numpy", "scipy")
@@ -19,6 +20,7 @@ _LIBRARIES = ("casadi", "numba", "numpy", "scipy")
 _ASIDE = ("charts", "cli", "interop", "paper")
 
 
+@makes_of_kinds
 class Checkpoint:
     """An append-only file of finished results.
 

@@ -1,4 +1,4 @@
-"""Refuse an argument of another kind than a public function's annotations name."""
+"""Refuse an argument of another kind than a public function's or class's annotations name."""
 
 from __future__ import annotations
 
@@ -53,6 +53,12 @@ def checks_kinds(function: Callable[P, R]) -> Callable[P, R]:
     return checked
 
 
+def makes_of_kinds(made: type[R]) -> type[R]:
+    """Return a class whose maker looks at the kinds of its arguments before anything else."""
+    made.__init__ = checks_kinds(made.__init__)  # type: ignore[method-assign]
+    return made
+
+
 @dataclass(frozen=True)
 class _Kind:
     """Alternatives, of which a value is to be one."""
@@ -83,6 +89,8 @@ def _annotated(function: Callable[..., Any], name: str) -> _Kind | None:
     """Return the kind that an annotation names, or None where it names none that binds."""
     parameter = inspect.signature(function).parameters[name]
     if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+        return None
+    if parameter.annotation is parameter.empty:
         return None
     try:
         parts = _parts(eval(parameter.annotation, function.__globals__))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -32,6 +33,7 @@ class Tie:
     factor: float = 1.0
 
 
+@makes_of_kinds
 @dataclass(frozen=True, eq=False)
 class FeedbackStructure:
     """Which outputs are fed back to which inputs, now and delayed, and within what bounds.

@@ -14,7 +14,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.drilling.bit_rock import BitRock, PaperLaw
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import (
@@ -32,6 +32,7 @@ from drillctrl.drilling.string import LumpedString, String, StringFunction, Stri
 R = TypeVar("R")
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class Plant:
     """What drills: a linear structure with a bit in the rock.

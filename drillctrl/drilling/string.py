@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.drilling.coefficients import Coefficients, Expression
 from drillctrl.drilling.part import Part
 from drillctrl.drilling.quantities import RATES, checked_quantity
@@ -23,6 +23,7 @@ BIT = ("x", "theta")
 TOP = ("x_top", "theta_top")
 
 
+@makes_of_kinds
 @dataclass(frozen=True, eq=False)
 class String:
     """A linear structure seen from its two ports.

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.delay.closing import gain_matrices
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.plant import Plant
@@ -41,6 +42,7 @@ class ScheduleEntry(NamedTuple):
     delay: float | None = None
 
 
+@makes_of_kinds
 @dataclass(frozen=True, eq=False)
 class Controller:
     """Output feedback u = K1 Y(t) + K2 Y(t − τ) with what surrounds it (Eqs. 36-40).

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.advance import finished, go_on
 from drillctrl.simulation.controller import Controller
@@ -24,6 +24,7 @@ BACKWARDS = ("rest", "stop")
 LONGEST = 1e6
 
 
+@makes_of_kinds
 class Interrupted(KeyboardInterrupt):
     """An interrupt of a run, such as Ctrl-C, that keeps what was reached.
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
 from drillctrl.simulation.advance import finished, go_on
@@ -22,6 +23,7 @@ from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import prepare
 
 
+@makes_of_kinds
 class SteppedRun:
     """The nonlinear string under inputs that are given anew each period and held in between.
 

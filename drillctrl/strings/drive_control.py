@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 
 _MOST_COEFFICIENTS = 21
 
@@ -133,6 +134,7 @@ class Transfer:
         return {"numerator": list(self.numerator), "denominator": list(self.denominator)}
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class DriveControl:
     """A machine and the law that controls it.

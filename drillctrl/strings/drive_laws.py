@@ -14,13 +14,14 @@ import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.files import check_regular
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
 
 _SIDES, _PARTS = ("speed", "torque"), ("numerator", "denominator")
 _LARGEST = 10_000_000
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class DriveLaws:
     """The law of a drive at each of some depths; in between that of the nearest one.

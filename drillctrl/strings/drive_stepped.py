@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.strings.drive_sampled import DRIVE_BITS, SampledDrive
 
 _BIT = {name: value for name, value, _ in DRIVE_BITS}
@@ -12,6 +13,7 @@ _BIT = {name: value for name, value, _ in DRIVE_BITS}
 _NO_TORQUE = 1e30
 
 
+@makes_of_kinds
 class SteppedDrive:
     """What the exported source of a drive's law computes, operation by operation.
 

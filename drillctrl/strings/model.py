@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_number
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.drilling.coefficients import Coefficients, Expression
 from drillctrl.drilling.string import String, StringModel
 from drillctrl.strings.drill_string import DrillString
@@ -49,6 +50,7 @@ def resolve(string: DrillString, torsional: float, axial: float, tolerance: floa
     return Resolved(tension, torsion, tension_error, torsion_error)
 
 
+@makes_of_kinds
 class PipeString(StringModel):
     """A drill string of pipe by its modes.
 

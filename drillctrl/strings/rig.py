@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.hoist import Hoist
@@ -54,6 +54,7 @@ class WeightControl:
         checked_number("feed gain", self.feed_gain, 0.0, 1.0, open_low=True)
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class StringRig(Rig):
     """A rig with a real string; make it with `string_rig`.
@@ -160,8 +161,18 @@ def string_rig(
         What feeds the string by its weight.
     **bit_and_rock
         The attributes of `Rig` that say what bit and rock are.
+
+    Raises
+    ------
+    InputError
+        If one of these is missing, unknown or out of range.
     """
     values: dict[str, Any] = {**lumped_values(string), **bit_and_rock}
+    known = {each.name: each.default is MISSING for each in fields(Rig)}
+    for name in (*(name for name, needed in known.items() if needed), *values):
+        if name not in values or name not in known:
+            told = "given" if name in known else f"of {', '.join(known)}"
+            raise InputError(name, values.get(name, "(missing)"), told)
     return StringRig(**values, string=string, drive=drive, weight_control=weight_control)
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.base.language import FIELD, SI, Language
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.plant import Plant, paper_plant
@@ -127,6 +127,7 @@ def linear_axis(name: str, low: float, high: float, count: int) -> Axis:
     return Axis(name, tuple(np.linspace(low, high, count).tolist()))
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class Grid:
     """All combinations of a rotary speed, a feed and a rock, or depth or mud of a string.
