@@ -52,14 +52,16 @@ def plot_drives(drives: Mapping[str, Curves], pipe: float, title: str = "") -> F
             label=name,
         )
     returned.axhline(1.0, color=GREY, lw=0.6)
-    returned.set_ylabel("share of a wave returned |r|, dimensionless")
+    returned.set_ylabel("share of a wave returned\n|r|, dimensionless")
     returned.set_ylim(bottom=0.0)
     returned.legend(fontsize=8)
     impedance.set_yscale("symlog", linthresh=1.0)
-    impedance.set_ylabel("|Z| over the pipe's (dashed: real part), dimensionless")
-    damping.set_yscale("symlog", linthresh=0.1)
-    damping.set_ylim(bottom=None if grows else 0.0)
-    damping.axhline(0.0, color=GREY, lw=0.6)
+    impedance.set_ylabel("|Z| (dashed: real part)\nover the pipe's, dimensionless")
+    if grows:
+        damping.set_yscale("symlog", linthresh=0.1)
+        damping.axhline(0.0, color=GREY, lw=0.6)
+    else:
+        damping.set_yscale("log")
     damping.set_ylabel("damping, % of critical")
     damping.set_xscale("log")
     damping.set_xlabel("frequency, Hz")
