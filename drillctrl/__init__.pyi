@@ -136,7 +136,6 @@ from .robustness.radius import stability_radius as stability_radius
 from .robustness.transfer import frequency_response as frequency_response
 from .robustness.transfer import loop_transfer as loop_transfer
 from .simulation.controller import Controller as Controller
-from .simulation.drive_control import drive_controller as drive_controller
 from .simulation.drive_control import law_controller as law_controller
 from .simulation.drive_control import simulate_drive as simulate_drive
 from .simulation.energy import band_energy as band_energy

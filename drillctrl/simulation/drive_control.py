@@ -22,7 +22,7 @@ from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.stepping import SteppedRun
 from drillctrl.simulation.structure import structure_of
-from drillctrl.strings.drive_control import DriveControl, DriveMachine, Transfer
+from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_law import INTEGRAL, LAW, asking_plant, without_integral
 from drillctrl.strings.drive_sampled import SampledDrive
 from drillctrl.strings.drive_stepped import SteppedDrive
@@ -30,73 +30,10 @@ from drillctrl.strings.model import PipeString
 from drillctrl.strings.rig import StringRig
 
 DRIVE_PATH = ("measurement_delay", "actuator_lag")
-_NONE = np.zeros((1, 2))
-_ANY = np.full((1, 2), 1e12)
-SPEED_LOOP = FeedbackStructure(
-    "drive speed", ("phi", "dphi"), -_ANY, _ANY, -_NONE, _NONE, ("drive",)
-)  # fmt: skip
-
+_NONE, _ANY = np.zeros((1, 1)), np.full((1, 1), 1e12)
 LAW_LOOP = FeedbackStructure(
-    "law of the drive", (LAW,), -_ANY[:, :1], _ANY[:, :1], -_NONE[:, :1], _NONE[:, :1], ("drive",)
+    "law of the drive", (LAW,), -_ANY, _ANY, -_NONE, _NONE, ("drive",)
 )  # fmt: skip
-
-
-@checks_kinds
-def drive_controller(
-    where: RigPoint, control: DriveControl, *, period: float | None = None
-) -> Controller:
-    """Return the controller that holds the speed of a rig's top drive.
-
-    Parameters
-    ----------
-    where : RigPoint
-        A string under a top drive with inertia, and where it drills.
-    control : DriveControl
-        PI control of that drive, such as `stiff_control` or `soft_torque_control` returns. Its
-        machine says how late and slow the drive is, and how much torque it has; what the
-        controller adds to that of steady drilling stays within their difference both ways.
-    period : float, optional
-        Sampling period, s; without it the law is continuous.
-
-    Raises
-    ------
-    InputError
-        If the rig has no such drive, the law is not PI of the speed, or the drive has less
-        torque than steady drilling takes.
-
-    Notes
-    -----
-    The integral of the speed is the drive's angle behind its set point. It goes on while the
-    drive is at its limit, so that a drive that was stalled makes up for lost turns;
-    `law_controller` has one that does not.
-    """
-    rig, machine = where.rig, control.machine
-    drive = rig.drive if isinstance(rig, StringRig) else None
-    if drive is None:
-        raise InputError("rig", type(rig).__name__, "one with a string and a top drive")
-    if machine.inertia != drive.inertia:
-        raise InputError(
-            "inertia of the drive", machine.inertia, f"{drive.inertia:g}, as the rig's"
-        )
-    for name in ("delay", "lag"):
-        if getattr(drive, name):
-            wanted = "0 in the rig: in the simulator the controller's machine has it"
-            raise InputError(f"{name} of the drive", getattr(drive, name), wanted)
-    if machine.encoder:
-        raise InputError("encoder of the drive", machine.encoder, "0 in the simulator")
-    _check_counts(machine)
-    proportional, integral = _gains(control)
-    unit, time = rig.torsional_stiffness, rig.time_scale
-    limit = _spare_torque(as_case(where), machine, unit)
-    return Controller(
-        SPEED_LOOP,
-        [-integral / unit, -proportional / (unit * time)],
-        [0.0, 0.0],
-        limit=limit,
-        measurement_delay=machine.delay / time,
-        actuator_lag=machine.lag / time,
-        period=None if period is None else period / time,
-    )
 
 
 @checks_kinds
@@ -116,7 +53,8 @@ def law_controller(
         A string under a top drive with inertia, and where it drills.
     control : DriveControl
         Any law; filters and states of its own are in the plant. Delay, lag and torque limit of
-        its machine are the controller's, as in `drive_controller`.
+        its machine are the controller's; what it adds to the torque of steady drilling stays
+        within what the drive has beyond that, both ways.
     bit : BitRock, optional
         The bit–rock law, the paper's without it.
     period : float, optional
@@ -300,15 +238,3 @@ def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | Non
         "torque limit of the drive", machine.torque_limit, steady, 1e9, open_low=True
     )
     return (most - steady) / unit
-
-
-def _gains(control: DriveControl) -> tuple[float, float]:
-    """Return Kp and Ki of a PI law."""
-    law = control.speed
-    if law.denominator == (1.0,) and len(law.numerator) == 1:
-        law = Transfer((*law.numerator, 0.0), (1.0, 0.0))
-    if control.torque or law.denominator != (1.0, 0.0) or len(law.numerator) > 2:
-        wanted = "PI of the speed without compensated inertia in the simulator"
-        raise InputError("control", control.name, wanted)
-    proportional, integral = (0.0, *law.numerator)[-2:]
-    return proportional, integral

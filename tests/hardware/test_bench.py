@@ -27,7 +27,6 @@ from drillctrl import (
     cli,
     dimensionless_grid,
     drive_control,
-    drive_controller,
     linear_axis,
     load_recording,
     replay,
@@ -41,6 +40,7 @@ from drillctrl.hardware.client import table_law
 from drillctrl.hardware.wire import MAGIC, pack_answer, unpack_sample
 from drillctrl.simulation.stepping import SteppedRun
 from tests.interrupts import hears_interrupts
+from tests.simulation.speed_loop import speed_loop
 
 from ..tables.exported import InC
 
@@ -159,7 +159,7 @@ def test_a_top_drive_is_turned_by_its_software_in_si():
         lambda sample: [-integral * sample.outputs[0] - proportional * sample.outputs[1]],
         count=2, where=where, period=0.02 / unit, speedup=math.inf, **common,
     )  # fmt: skip
-    expected = simulate(where, drive_controller(where, control, period=0.02), **common)
+    expected = simulate(where, speed_loop(where, control, period=0.02), **common)
     assert found.recording.units == "SI"
     assert found.recording.times[-1] == pytest.approx(0.98)
     assert apart(expected, found.simulation, 1.0 / unit, ("theta", "phi", "drive")) < 1e-9

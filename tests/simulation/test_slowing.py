@@ -22,7 +22,8 @@ from drillctrl import (
     string_preset,
     string_rig,
 )
-from drillctrl.simulation.drive_control import drive_controller, law_controller
+from drillctrl.simulation.drive_control import law_controller
+from tests.simulation.speed_loop import speed_loop
 
 RPM = math.pi / 30
 BIT = {
@@ -56,7 +57,7 @@ def test_a_law_of_two_terms_is_the_pi_controller():
     control = rule_control("soft-torque", MACHINE, bare.string)
     kick = {"dtheta": 0.3 * 100 * RPM * bare.time_scale}
     seconds = 12.0 / bare.time_scale
-    known = simulate(where, drive_controller(where, control), duration=seconds, initial=kick)
+    known = simulate(where, speed_loop(where, control), duration=seconds, initial=kick)
     case, controller = law_controller(where, control)
     found = simulate(case, controller, duration=seconds, initial=kick)
     at = np.linspace(0.0, seconds, 600)
