@@ -238,9 +238,10 @@ def sampled_drive(
     if any(law.machine != machine for law in laws):
         raise InputError("controls", laws[0].name, "laws of one drive")
     step = checked_number("period", period, 0.0, 10.0, open_low=True)
-    most = checked_number(
-        "limit", machine.torque_limit if limit is None else limit, 0.0, 1e9, open_low=True
-    )
+    limit = machine.torque_limit if limit is None else limit
+    if limit is None:
+        raise InputError("limit", "(missing)", "given: the drive is said to have none of its own")
+    most = checked_number("limit", limit, 0.0, 1e9, open_low=True)
     parts = [_parts(law) for law in laws]
     if len({bool(part[0]) for part in parts}) > 1:
         raise InputError("controls", laws[0].name, "laws with an integral at every place, or none")

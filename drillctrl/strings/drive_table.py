@@ -22,7 +22,7 @@ from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
 from drillctrl.strings.drives import drive_control, machine_of
-from drillctrl.strings.drives_words import drive_settings
+from drillctrl.strings.drives_words import settings_text
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import lowest_impedance
@@ -141,8 +141,8 @@ class DriveTable:
                 f"{'none' if margin is None else f'{1e3 * margin:.3g}':>12}"
             )
         for depth, drive in self._laws():
-            settings = ", ".join(" ".join(row) for row in drive_settings(drive.control, language))
-            lines.append(f"{language.text('depth', depth, 6):>10}: {settings}")
+            there = language.text("depth", depth, 6)
+            lines.append(wrapped(f"{there}: {settings_text(drive.control, language)}", 2))
         if self.between:
             stood = f"{slope.per_si * min(self.between):.4g} {per}"
             lines.append(f"Held to the middle between depths, laws stand {stood} there")

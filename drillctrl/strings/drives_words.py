@@ -73,7 +73,7 @@ def comparison_summary(
             beside = "".join(f"{cell:>{columns}}" for cell in cells[begin : begin + abreast])
             table.append(f"{label:<{width}}{beside}".rstrip())
     laws = [
-        wrapped(f"{drive.control.name}: {_settings(drive.control, language)}", 2)
+        wrapped(f"{drive.control.name}: {settings_text(drive.control, language)}", 2)
         for drive in drives
     ]
     refused = [drive for drive in drives if not drive.verdict.recommended]
@@ -165,7 +165,8 @@ def drive_settings(control: DriveControl, language: Language) -> list[tuple[str,
     return rows
 
 
-def _settings(control: DriveControl, language: Language) -> str:
+def settings_text(control: DriveControl, language: Language = SI) -> str:
+    """Return a law in one line: in the words of a drive, else its transfer functions in SI."""
     rows = drive_settings(control, language)
     if language is SI or rows[0][0] != "P":
         return law_text(control)
