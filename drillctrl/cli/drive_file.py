@@ -78,14 +78,11 @@ def write_drive(found: DriveTable, out: str, settings: Mapping[str, Any]) -> Non
     law = sampled_drive(controls, depths=found.depths, **given)
     with naming("--period", "period"):
         stands = sampled_slopes(law, found.rig)
-    click.echo(
-        f"drillctrl: sampled every {1e3 * law.period:g} ms the string stands "
-        f"{min(stands):.4g} N·m·s",
-        err=True,
-    )
+    verdict = f"sampled every {1e3 * law.period:g} ms the string stands {min(stands):.4g} N·m·s"
+    click.echo(f"drillctrl: {verdict}", err=True)
 
     def write() -> None:
-        export_drive(law, out, **{name: settings[name] for name in _WRITTEN})
+        export_drive(law, out, verdict=verdict, **{name: settings[name] for name in _WRITTEN})
 
     with naming("--real", "real"):
         writing("--out", out, write)

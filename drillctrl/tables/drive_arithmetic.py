@@ -11,6 +11,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.strings.drive_sampled import DriveNode, SampledDrive
+from drillctrl.tables.arithmetic import Cost
 
 # Half a unit in the last place of a float, relative.
 _ROUNDING = 2.0**-24
@@ -20,6 +21,22 @@ _MOST_ROUNDED = 0.01
 # Comments, and numbers with a point, of C.
 _COMMENT = re.compile(r"(/\*.*?\*/)", re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d*(?:e[+-]?\d+)?")
+
+
+def drive_worst_cost(law: SampledDrive) -> Cost:
+    """Return the most operations of one step of the C source: on, where another law begins."""
+    n, inputs, switches = law.order, len(law.largest), sum(map(len, law.edges))
+    several, integrates, rated = len(law.nodes) > 1, law.integrates, law.rate is not None
+    value = 3 + 2 * n
+    # A law hands over while it acts, and its states rest at what is measured while it does not.
+    over = (value + 1) * several + max(3 * n, (1 if integrates else 4) * several)
+    # Error, filters and the torque in the pipe, the law, the growth of its integral, its states.
+    follow = 1 + 4 + 3 + 3 + value + 3 + n * (3 + 2 * n) + over
+    # The first sample sets out with a difference; what a limit keeps is taken from the integral.
+    operations = 1 + follow + (4 if integrates else 6) + 2 * rated + 2 * integrates
+    divisions = 1 + (several and not integrates)
+    sample = 3 + 3 + 2 * inputs + 2 + 2 * (inputs - 3) + 2 * switches
+    return Cost(operations, divisions, sample + 2 + 2 + 2 * rated + 10 * integrates + 2 + 2 + 2)
 
 
 class FloatDifference(NamedTuple):

@@ -15,7 +15,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.templates import filled
 from drillctrl.strings.drive_sampled import DRIVE_AXES, DRIVE_BITS, SampledDrive
 from drillctrl.tables.bench_st import bench_name, bench_text
-from drillctrl.tables.drive_arithmetic import float_words, in_float
+from drillctrl.tables.drive_arithmetic import drive_worst_cost, float_words, in_float
 from drillctrl.tables.drive_vectors import DriveVectors, drive_vectors
 from drillctrl.tables.export_c import check_c_header, check_c_name, check_real
 from drillctrl.tables.export_fmu import check_fmu, write_fmu
@@ -25,6 +25,7 @@ from drillctrl.tables.plcopen import plcopen_text
 from drillctrl.tables.reserved import is_identifier
 
 ENDINGS = (".c", ".st", ".scl", ".xml", ".fmu")
+NOT_ASKED = "none: no string was asked whether this law does it harm"
 # What the block declares, so that its own name is none of these.
 _VARIABLES = """
     MeasuredSpeed WantedSpeed GivenTorque StringDepth RotarySpeed RockStrength MudDensity
@@ -53,7 +54,12 @@ _WORDS = {
 
 @checks_kinds
 def export_drive(
-    law: SampledDrive, path: str | Path, *, fmi: str = "3.0", real: str = "double"
+    law: SampledDrive,
+    path: str | Path,
+    *,
+    fmi: str = "3.0",
+    real: str = "double",
+    verdict: str = NOT_ASKED,
 ) -> Path:
     """Write the law of a top drive as source for its controller.
 
@@ -74,6 +80,8 @@ def export_drive(
         Version of the standard of an .fmu.
     real : {"double", "float"}
         Arithmetic of a .c; the header says by how much float differs at most.
+    verdict : str
+        What was found of the law, which stands in what is written; see `sampled_slopes`.
 
     Raises
     ------
@@ -89,14 +97,14 @@ def export_drive(
         raise InputError("real", real, "double but in a .c")
     ending = where.suffix.lower()
     if ending == ".c":
-        _write_c(law, where.parent, where.stem, real)
+        _write_c(law, where.parent, where.stem, verdict, real)
     elif ending == ".fmu":
-        _write_fmu(law, where, fmi)
+        _write_fmu(law, where, fmi, verdict)
     else:
         text = filled(
             "drillctrl.tables",
             "drive.st.j2",
-            **_words(law, where.stem, "{:.17E}"),
+            **_words(law, where.stem, "{:.17E}", verdict),
             scl=ending == ".scl",
             dialect_words=DIALECTS[ending == ".scl"],
         )
@@ -155,8 +163,10 @@ def _bench(law: SampledDrive, name: str, vectors: DriveVectors) -> str:
     return bench_text(name, columns, {}, {**inputs, **given}, "TorqueCommand", law.limit, "N m")
 
 
-def _write_c(law: SampledDrive, folder: str | Path, name: str, real: str = "double") -> None:
-    words = _words(law, name, "{:.17e}" if real == "double" else "{:.9e}")
+def _write_c(
+    law: SampledDrive, folder: str | Path, name: str, verdict: str, real: str = "double"
+) -> None:
+    words = _words(law, name, "{:.17e}" if real == "double" else "{:.9e}", verdict)
     words["rounding"] = float_words(law) if real == "float" else []
     labels = {
         "LawEdges": "edges", "AtRest": "at_rest", "ByInput": "by_input", "ByState": "by_state",
@@ -171,7 +181,7 @@ def _write_c(law: SampledDrive, folder: str | Path, name: str, real: str = "doub
             stack.enter_context(replacing(target)).write(text.encode("ascii"))
 
 
-def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
+def _words(law: SampledDrive, name: str, form: str, verdict: str) -> dict[str, Any]:
     """Return what the templates name; numbers in the form of the language."""
     number = form.format
     arrays = {
@@ -189,6 +199,8 @@ def _words(law: SampledDrive, name: str, form: str) -> dict[str, Any]:
         "name": name,
         "law": drive_words(law),
         "care": _care(law),
+        "verdict": textwrap.wrap(_plain(verdict), 76),
+        "costs": drive_worst_cost(law),
         "period_s": law.period,
         "limit_nm": law.limit,
         "period": number(law.period),
@@ -236,9 +248,13 @@ def drive_words(law: SampledDrive) -> list[str]:
     for at, words in zip(itertools.product(*varying), law.words, strict=True):
         place = ", ".join(filter(None, at))
         place += ": " if place else ""
-        plain = words.replace("·", " ").replace("²", "2").replace("−", "-")
-        lines += textwrap.wrap(place + plain.encode("ascii", "replace").decode(), 76)
+        lines += textwrap.wrap(place + _plain(words), 76)
     return lines
+
+
+def _plain(words: str) -> str:
+    plain = words.replace("·", " ").replace("²", "2").replace("−", "-")
+    return plain.encode("ascii", "replace").decode()
 
 
 def _care(law: SampledDrive) -> list[str]:
@@ -258,7 +274,7 @@ def _care(law: SampledDrive) -> list[str]:
     return textwrap.wrap(" ".join(text), 76)
 
 
-def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
+def _write_fmu(law: SampledDrive, path: Path, fmi: str, verdict: str) -> None:
     limit = law.limit
     status = "sum of " + "; ".join(f"{value}: {words}" for _, value, words in DRIVE_BITS)
 
@@ -290,10 +306,15 @@ def _write_fmu(law: SampledDrive, path: Path, fmi: str) -> None:
     write_fmu(
         path,
         fmi,
-        lambda folder: _write_c(law, folder, path.stem),
+        lambda folder: _write_c(law, folder, path.stem, verdict),
         listed,
-        [("law", words), ("method", "trapezoidal rule"), ("care", " ".join(_care(law)))],
-        text=f"Control of a top drive. Law: {words}.",
+        [
+            ("law", words),
+            ("method", "trapezoidal rule"),
+            ("care", " ".join(_care(law))),
+            ("verdict", _plain(verdict)),
+        ],
+        text=f"Control of a top drive. Verdict: {_plain(verdict)}. Law: {words}.",
         stamp=law.stamp,
         period=law.period,
         arguments=", ".join(f"data->number[{i}u]" for i in range(1, 4 + len(law.axes))),

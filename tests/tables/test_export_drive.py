@@ -2,6 +2,7 @@
 
 import csv
 import ctypes
+import re
 import subprocess
 import zipfile
 from dataclasses import replace
@@ -34,6 +35,7 @@ from drillctrl.tables.reserved import is_identifier
 
 from .exported import FLAGS, SERIAL, compiled
 from .iec import Block, load
+from .test_arithmetic import COUNTING
 
 RIG = string_preset("vertical-3000")
 DRIVE = RIG.drive
@@ -197,6 +199,67 @@ def test_every_language_gives_the_same_torque(laws, tmp_path, name):
     assert largest == law.limit
     wanted = 2 + 4 + 16 + 128 + (8 + 64 if law.rate else 0) + any(law.edges)
     assert seen & wanted == wanted
+
+
+COUNTED = """
+extern "C" double count_step(const double *given, int on, double elapsed, double limit)
+{
+    static drill_state state;
+    static bool begun;
+    if (!begun) { drill_init(&state); begun = true; }
+    state.elapsed = elapsed; state.limit = limit;
+    return drill_step(&state, GIVEN, on).v;
+}
+"""
+
+
+@pytest.mark.parametrize("name", ["soft-torque", "dynamic-2", "own", "resistance", "scheduled"])
+def test_no_step_costs_more_than_the_header_says(laws, tmp_path, name, tool):
+    """The same source, compiled as C++ with numbers that count what is done to them."""
+    tool("g++")
+    law = laws[name]
+    source = export_drive(law, tmp_path / "drill.c")
+    header = source.with_suffix(".h").read_text()
+    said = r"at most (\d+) operations a step, (\d+) of them divisions, and\s+\*\s+(\d+) comp"
+    stated = [int(number) for number in re.search(said, header).groups()]
+    header = header.replace('#ifdef __cplusplus\nextern "C" {\n#endif\n', "")
+    header = header.replace("#ifdef __cplusplus\n}\n#endif\n", "").replace("double", "Real")
+    minus = "static Real &operator-=(Real &a, Real b) { return a = a - b; }\n"
+    source.with_suffix(".h").write_text(COUNTING.replace("#include <cmath>", "") + minus + header)
+    given = ", ".join(f"given[{k}]" for k in range(3 + len(law.axes)))
+    counted = source.read_text().replace("double", "Real") + COUNTED.replace("GIVEN", given)
+    (tmp_path / "count.cpp").write_text(counted)
+    library = compiled([tmp_path / "count.cpp"], tmp_path / "count.so", "-w", compiler="g++")
+    counters = [
+        ctypes.c_long.in_dll(library, n) for n in ("operations", "divisions", "comparisons")
+    ]
+    library.count_step.restype = ctypes.c_double
+    most = [0, 0, 0]
+    for *sample, place, on, extra in hostile(law, 6_000, seed=4):
+        before = [counter.value for counter in counters]
+        values = (ctypes.c_double * (3 + len(place)))(*sample, *place)
+        elapsed, limit = (ctypes.c_double(extra.get(n, law.period)) for n in ("elapsed", "limit"))
+        library.count_step(values, int(on), elapsed, limit)
+        spent = [c.value - b for c, b in zip(counters, before, strict=True)]
+        most = [max(a, b) for a, b in zip(most, spent, strict=True)]
+    assert all(a <= b for a, b in zip(most, stated, strict=True)), (most, stated)
+    assert stated[0] <= 1.15 * most[0]
+    assert stated[2] <= 1.3 * most[2]
+
+
+def test_what_was_found_of_a_law_stands_in_all_that_is_written(laws, tmp_path):
+    told = "sampled every 5 ms the string stands 118 N·m·s"
+    for ending in (".c", ".st", ".scl", ".xml", ".fmu"):
+        path = export_drive(laws["own"], tmp_path / f"drill{ending}", verdict=told)
+        if ending == ".fmu":
+            with zipfile.ZipFile(path) as unit:
+                text = unit.read("modelDescription.xml").decode()
+        else:
+            text = path.with_suffix(".h" if ending == ".c" else ending).read_text("utf-8")
+        assert "Verdict" in text
+        assert "the string stands 118 N m s" in text
+    silent = export_drive(laws["own"], tmp_path / "silent.c").with_suffix(".h").read_text()
+    assert "no string was asked" in silent
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
