@@ -193,11 +193,13 @@ def deliver_drive_table(
     return found.stable and found.harm is None
 
 
-def _write(found: DriveComparison | DriveTable, out: str | None) -> None:
+def _write(
+    found: DriveComparison | DriveTable, out: str | None, fields: dict[str, Any] | None = None
+) -> None:
     if out is None:
         return
     csv = Path(out).suffix.lower() == ".csv"
-    text = found.to_csv() if csv else json_text(found.to_dict()) + "\n"
+    text = found.to_csv() if csv else json_text(fields or found.to_dict()) + "\n"
     from drillctrl.base.files import write_text
 
     writing("--out", out, lambda: write_text(out, text))
@@ -261,8 +263,10 @@ def deliver_drives(
         tried = drive_trials(where, found.drives)
         fields["trials"] = [each.to_dict() for each in tried]
         fields["best"] = best_tried(tried).drive.control.name
-        text += f"\n\n{trials_text(tried, as_case(where).place)}"
-    _write(found, out)
+        # What runs bore out stands first, in place of what the string alone advises.
+        _, table = text.split("\n\n", 1)
+        text = f"{trials_text(tried, as_case(where).place)}\n\n{table}"
+    _write(found, out, fields)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot(rig_name(point)))
     click.echo(json_text(fields) if as_json else plain(text))

@@ -344,10 +344,12 @@ def _look_back(
     march, model, interpolate = (
         kernel(name, structure.physics) for name in ("march", "model", "interpolate")
     )
+    sets = range(len(settings.schedule))
+    longest = max(model.lag_of(settings, i, k) for i in range(3) for k in sets)
+    if longest > known:
+        raise InputError("start", f"a past of {known:g}", f"one that is known for {longest:g}")
     for i in range(3):
         lag = model.lag_of(settings, i, 0)
-        if lag > known:
-            raise InputError("start", f"a past of {known:g}", f"one that is known for {lag:g}")
         if lag > 0.0:
             standing.ints[march.LAG0 + i] = interpolate.step_at(standing.history, steps, -lag)
 

@@ -65,6 +65,7 @@ def past_of(
     time: float | None = None,
     changed: float | None = None,
     kept: float | None = None,
+    known: float = math.inf,
 ) -> Past:
     """Return what a run has left behind.
 
@@ -78,6 +79,8 @@ def past_of(
         When the drive or the rock was first changed, which must not be before the instant.
     kept : float, optional
         So much time is kept, and besides it what the faces in the rock need; by default all.
+    known : float
+        So much time before the run is known.
 
     Raises
     ------
@@ -104,7 +107,7 @@ def past_of(
         begun, length = real[-1][[data.START, data.LENGTH]]
         restrict(real[-1], 0.0, (when - begun) / length, len(names))
     real[:, data.START] -= when
-    known = -float(real[0, data.START]) if dropped else math.inf
+    known = -float(real[0, data.START]) if dropped else known + when
     return Past(run.point, run.structure, run.model, state, real, whole, known)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -104,8 +105,9 @@ class Simulation(Trace):
         InputError
             If the instant is outside the run, or the rig was changed before it.
         """
-        changes = self.scenario.changes
-        return past_of(self, time, changes[0].time if changes else None, kept)
+        changes, start = self.scenario.changes, self.scenario.start
+        known = start.known if isinstance(start, Past) else math.inf
+        return past_of(self, time, changes[0].time if changes else None, kept, known)
 
     @functools.cached_property
     def summary(self) -> Summary:

@@ -1,11 +1,12 @@
 """Laws of a drive on the nonlinear motion: the best of what was tried is the answer."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from drillctrl import DriveMachine, RigPoint, compare_drives, simulate, string_preset
+from drillctrl import DriveMachine, RigPoint, cli, compare_drives, simulate, string_preset
 from drillctrl.designs import drive_design
 from drillctrl.designs.drive_trials import DriveTrials, best_tried, drive_trials, trials_text
 from drillctrl.designs.trials import STARTS, Trial
@@ -99,3 +100,18 @@ def test_the_answer_of_a_dynamic_design_is_the_best_that_was_tried(monkeypatch):
     found = drive_design.design_drive(WHERE, "dynamic-0", trials=True)
     assert not found.recommended
     assert found.summary().startswith("Refused: ")
+
+
+def test_a_comparison_at_a_point_begins_with_the_runs_and_writes_them(
+    monkeypatch, tmp_path, capsys
+):
+    monkeypatch.setattr("drillctrl.designs.drive_trials.STARTS", STARTS[:1])
+    monkeypatch.setattr("drillctrl.designs.drive_trials._PERIODS", 1.0)
+    point = ["--rig", "vertical-3000", "--speed", "120 rpm", "--rop", "10 m/h"]
+    file = tmp_path / "drives.json"
+    with pytest.raises(SystemExit):
+        cli.main(["compare", *point, "--structures", "stiff,soft-torque", "--out", str(file)])
+    assert capsys.readouterr().out.startswith("Trial runs at 120 rpm, 10 m/h")
+    written = json.loads(file.read_text())
+    assert [each["structure"] for each in written["trials"]] == ["stiff", "soft-torque"]
+    assert written["best"] in ("stiff", "soft-torque")

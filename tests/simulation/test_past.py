@@ -99,6 +99,11 @@ def test_a_past_without_what_nothing_looks_at(point, kick):
     late = Controller("case1", [-3.82], [3.61], measurement_delay=20.0)
     with pytest.raises(InputError, match="known for 20"):
         simulate(point, late, duration=1.0, scenario=Scenario(start=past))
+    # What a run does not know that goes on from there, the next does not know either.
+    short = simulate(point, duration=0.5, scenario=Scenario(start=past)).past()
+    assert short.known == pytest.approx(past.known + 0.5)
+    with pytest.raises(InputError, match="known for 20"):
+        simulate(point, late, duration=1.0, scenario=Scenario(start=short))
     enough = run.past(kept=2.5)
     assert 2.5 <= enough.known < 6.0
 
