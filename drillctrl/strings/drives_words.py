@@ -104,7 +104,9 @@ def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: L
     )
     fall = language.text("torque", falling.drop, 3)
     stay = (
-        f"Stay above {_rpm(speed):.3g} rpm with it" if speed > 0.0 else "With it any speed will do"
+        f"Stay above {_rpm(speed):.3g} rpm with it"
+        if speed > 0.0
+        else "By this measure no speed is too low for it"
     )
     told += f" {stay}{f' ({beside})' if beside else ''}, if the bit's torque falls by {fall}"
     return f"{told} as it turns faster (a guess: measure it)."

@@ -86,7 +86,11 @@ def _of_drive(found: ReportValues) -> list[str]:
         texts = [found.language.text("angular_rate", speed, 3) for speed in speeds]
         beside = f" ({texts[1]} with a stiff drive)" if law is not stiff else ""
         fall = found.language.text("torque", found.drives.falling.drop, 3)
-        stay = f"Stay above {texts[0]} with it" if speeds[0] > 0.0 else "With it any speed will do"
+        stay = (
+            f"Stay above {texts[0]} with it"
+            if speeds[0] > 0.0
+            else "By this measure no speed is too low for it"
+        )
         told.append(
             f"{stay}{beside}, if the bit's torque falls by {fall} as it"
             " turns faster (a guess: measure it)."
