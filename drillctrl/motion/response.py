@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.shelf import Shelf
 from drillctrl.drilling.case import Case, Where, as_case
+from drillctrl.drilling.plant import Plant
 from drillctrl.motion.record import Halves, halves, windowed
 from drillctrl.motion.turning import Led, Turned
 from drillctrl.simulation.outcome import grows_without_bound
@@ -193,7 +195,26 @@ def bit_response(
         return measured()
     plant, point = case.physics("the response of a bit")
     asked = (frequency, amplitude, tolerance, most_periods, ripple, sorted(options.items()))
-    return Shelf(keep, _CLASSES).get((plant.text, point, *asked), measured)
+    return Shelf(keep, _CLASSES).get((plant.text, _own_sources(plant), point, *asked), measured)
+
+
+def _own_sources(plant: Plant) -> list[str]:
+    """Return the sources of parts that are not the package's, whose names say little of them.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read.
+    """
+    kinds = [type(part) for part in plant.parts]
+    found = []
+    for kind in [kind for kind in kinds if not kind.__module__.startswith("drillctrl.")]:
+        try:
+            found.append(inspect.getsource(kind))
+        except (OSError, TypeError):
+            wanted = f"left out: the source of {kind.__name__} cannot be read, nor told from others"
+            raise InputError("keep", "given", wanted) from None
+    return found
 
 
 def _measured(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from typing import NamedTuple
@@ -81,7 +82,11 @@ def _of_node(law: SampledDrive, node: DriveNode) -> FloatDifference:
     pipe = stiff * (r * speed + slow) + drag + 3.0 * r * most[1]
     off = np.array([4.0 * r * speed, pipe])
     n = law.order
-    through, passed = _responses(node)
+    responses = _responses(node)
+    if responses is None:
+        # A memory that was not seen to fade bounds nothing.
+        return FloatDifference(math.inf, math.inf, math.inf)
+    through, passed = responses
     states = through[:n] @ most
     rounded = (n + 4) * r * (np.abs(node.F) @ states + np.abs(node.G) @ most)
     value = np.abs(node.C) @ states + np.abs(node.D) @ most
@@ -100,8 +105,11 @@ def _of_node(law: SampledDrive, node: DriveNode) -> FloatDifference:
     )
 
 
-def _responses(node: DriveNode) -> tuple[FloatArray, FloatArray]:
-    """Return Σ abs(F^k G), and below it Σ abs(C F^k G), (n + 1, 2); and Σ abs(C F^k), (n,)."""
+def _responses(node: DriveNode) -> tuple[FloatArray, FloatArray] | None:
+    """Return Σ abs(F^k G), and below it Σ abs(C F^k G), (n + 1, 2); and Σ abs(C F^k), (n,).
+
+    None where they do not fade.
+    """
     moved, row = node.G.copy(), node.C.copy()
     states, command = np.zeros_like(moved), np.zeros(moved.shape[1])
     passed = np.zeros_like(row)
@@ -116,6 +124,8 @@ def _responses(node: DriveNode) -> tuple[FloatArray, FloatArray]:
         ):
             break
         moved, row = node.F @ moved, row @ node.F
+    else:
+        return None
     return np.vstack([states, command]), passed
 
 

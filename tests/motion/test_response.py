@@ -20,6 +20,7 @@ from drillctrl import (
     cli,
     drilling_motion,
     mode_at,
+    paper_plant,
     plant_system,
     simulate,
     spectral_abscissa,
@@ -402,3 +403,12 @@ def test_answers_are_kept_by_what_computed_them(tmp_path, monkeypatch):
     assert len(list(tmp_path.iterdir())) == 4
     with pytest.raises(InputError, match="keep"):
         bit_response(where, 1.0, 0.1, most_periods=40, keep=kept)
+
+
+def test_answers_under_a_law_that_cannot_be_read_are_not_kept(tmp_path):
+    """Its name would stand for whatever it is changed to."""
+    made = {}
+    exec("from drillctrl import PaperLaw\nclass Own(PaperLaw): pass", {"__name__": "away"}, made)
+    case = as_case(OperatingPoint(5.0, 0.2, 14.0), paper_plant(made["Own"]()))
+    with pytest.raises(InputError, match="source of Own"):
+        bit_response(case, 1.0, 0.1, keep=tmp_path)

@@ -30,7 +30,7 @@ from drillctrl import (
     transfer_control,
 )
 from drillctrl.strings.drive_stepped import SteppedDrive
-from drillctrl.tables.drive_arithmetic import drive_float_difference
+from drillctrl.tables.drive_arithmetic import drive_float_difference, float_words
 from drillctrl.tables.reserved import is_identifier
 
 from .exported import FLAGS, SERIAL, compiled
@@ -595,3 +595,11 @@ def test_the_command_writes_laws_over_depth_and_at_one(tmp_path, capsys):
         status, told, err = call(*bad)
         assert (status, told) == (2, ""), bad
         assert f"drillctrl: {option} = " in err, (bad, err)
+
+
+def test_a_memory_that_was_not_seen_to_fade_bounds_no_float(laws, monkeypatch):
+    assert np.isfinite(drive_float_difference(laws["observer-1"]).torque)
+    monkeypatch.setattr("drillctrl.tables.drive_arithmetic._MOST", 20)
+    assert np.isinf(drive_float_difference(laws["observer-1"]).torque)
+    with pytest.raises(InputError, match="double"):
+        float_words(laws["observer-1"])
