@@ -36,6 +36,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     converged : bool array, (q,)
         Whether the last correction was at the level of rounding.
     """
+    if not start.size:
+        return start, np.zeros(0, dtype=bool)
     if start.size == 1:
         value, converged = _polish_one(system, complex(start[0]))
         return np.array([value]), np.array([converged])
@@ -62,7 +64,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
                 step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
         s = s - step
         s.imag = np.abs(s.imag)
-        last = size
+        # What is done keeps its last correction, by which it is judged below.
+        last = np.where(done, last, size)
         # The iteration squares the error relative to the distance of the next root.
         square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
         done |= stalled | square | (size <= 4 * EPSILON * scale)
