@@ -15,6 +15,8 @@ EPSILON = float(np.finfo(float).eps)
 # An iteration that comes to rest with steps larger than this has found a multiple root, or
 # nothing: at a root Δ is singular to so much.
 _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
+# How many roots of a system of many states are sharpened at last, and by how much at most.
+_SHARPENED, _ROUNDED = 8, 1e-9
 # Relative steps about a root of high multiplicity, at most.
 _ABOUT = 0.05
 
@@ -79,7 +81,24 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     rough = np.flatnonzero(still | (done & (met | (last > _ROUGH_STEP * scale))))
     if rough.size:
         done[rough] = are_roots(system, s[rough])
-    return s, done
+    return _sharpened(system, s, done), done
+
+
+def _sharpened(system: DelaySystem, s: ComplexArray, done: npt.NDArray[np.bool_]) -> ComplexArray:
+    """Return roots of a system of many states with a last step by Δ itself, the rightmost."""
+    if not characteristic.is_thin(system):
+        return s
+    some = np.flatnonzero(done)
+    some = some[np.argsort(-s.real[some])][:_SHARPENED]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = 1.0 / characteristic.trace_ratio(
+            *characteristic.matrix_and_derivative(system, s[some])
+        )
+    # Next to another root the step is that of a multiple one: as good as it was.
+    small = np.abs(step) < _ROUNDED * (1.0 + np.abs(s[some]))
+    s[some] -= np.where(small, step, 0.0)
+    s.imag = np.where(s.imag < 0.0, 0.0, s.imag)
+    return s
 
 
 def are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
