@@ -19,6 +19,9 @@ _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
 _SHARPENED, _ROUNDED = 8, 1e-9
 # Relative steps about a root of high multiplicity, at most.
 _ABOUT = 0.05
+# Radius of a circle about it, over 1/τ, at most.
+_CIRCLED = 0.3
+_CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 
 
 def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
@@ -81,6 +84,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     rough = np.flatnonzero(still | (done & (met | (last > _ROUGH_STEP * scale))))
     if rough.size:
         done[rough] = are_roots(system, s[rough])
+        rough = rough[done[rough]]
+        done[rough] = _are_beside_roots(system, s[rough])
     return _sharpened(system, s, done), done
 
 
@@ -99,6 +104,18 @@ def _sharpened(system: DelaySystem, s: ComplexArray, done: npt.NDArray[np.bool_]
     s[some] -= np.where(small, step, 0.0)
     s.imag = np.where(s.imag < 0.0, 0.0, s.imag)
     return s
+
+
+def _are_beside_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
+    """Whether circles about places have roots inside.
+
+    Where exp(−sτ) is huge Δ may be singular to rounding, and no root anywhere near.
+    """
+    scale = 1.0 + np.abs(s)
+    widest = _CIRCLED / system.max_delay if system.delays else np.inf
+    ring = np.minimum(_ABOUT * scale, widest)[:, None] * _CIRCLE
+    slope = characteristic.log_derivative(system, (s[:, None] + ring).ravel())
+    return np.asarray((slope.reshape(ring.shape) * ring).mean(axis=1).real > 0.5)
 
 
 def are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
