@@ -226,6 +226,7 @@ from .strings.slopes import critical_slopes as critical_slopes
 from .strings.slopes import drive_delay_margin as drive_delay_margin
 from .strings.slopes import mode_slopes as mode_slopes
 from .strings.slopes import weakest_slope as weakest_slope
+from .strings.wall import Wall as Wall
 from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare

@@ -17,7 +17,7 @@ from drillctrl.drilling.motion import (
     BIT_COEFFICIENTS,
     MotionArrays,
     load_function,
-    rest_state,
+    rest_states,
     stuck_states,
 )
 from drillctrl.simulation.translate import translate
@@ -74,7 +74,7 @@ class Structure:
 
     def is_same(self, other: Structure) -> bool:
         """Whether another string and law move alike."""
-        names = ("q", "A", "E", "B", "T")
+        names = ("q", "A", "E", "B", "T", "side_force", "side_rate", "side_torque")
         # Coefficients that a string has no use for are NaN.
         return self.law == other.law and all(
             np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name), equal_nan=True)
@@ -82,9 +82,9 @@ class Structure:
         )
 
     @functools.cached_property
-    def rest(self) -> FloatArray:
-        """State of a bit at rest without load, the top end at V0 t = Ω0 t = 0, (n,)."""
-        return rest_state(self.arrays)
+    def rest(self) -> tuple[FloatArray, FloatArray]:
+        """States of a string at rest without load, before and after its top sets off, (n,) each."""
+        return rest_states(self.arrays, self.state_names)
 
     def stuck(self, time: float) -> tuple[FloatArray, FloatArray]:
         """States of a string whose bit stands still: at first, and so long after, (n,) each."""

@@ -32,6 +32,7 @@ from .data import (
     PASSES,
     PIVOTS,
     SATURATED,
+    SIDES,
     SINCE,
     START,
     STATES,
@@ -87,7 +88,8 @@ def evaluate(settings, history, steps, places, times, wanted):
     """
     n, m = settings.whole[STATES], settings.whole[INPUTS]
     result = np.zeros((wanted.shape[0], times.shape[0]))
-    y, out, probe = np.zeros(n + 4 * m + 6 + PIVOTS), np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
+    y = np.zeros(n + 4 * m + 6 + PIVOTS + settings.whole[SIDES])
+    out, probe = np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
     # At rest the velocity is known; its interpolation is off by rounding.
     standing = rates((0.0, 0.0, 0.0, 0.0), settings.bit)
     linear = settings.whole[LINEAR] == 1
