@@ -32,8 +32,8 @@ def _record(law: BitRock) -> tuple[ca.SX, Coefficients, Any]:
     return ca.vertcat(*c, *own.values()), Coefficients(*c), SimpleNamespace(**own)
 
 
-def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
-    """Return the bit in the rock on one branch of its switches, for event-driven use.
+def load_function(law: BitRock) -> ca.Function:
+    """Return the loads of the bit on one branch of its switches, for event-driven use.
 
     Parameters
     ----------
@@ -42,24 +42,33 @@ def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
 
     Returns
     -------
-    load : Function
+    Function
         (contact, rates, q) → weight and torque on bit; see `Contact` and `Rates`.
+    """
+    q, c, own = _record(law)
+    contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
+    load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
+    return ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)])
+
+
+def kinematic_functions() -> tuple[ca.Function, ...]:
+    """Return the bit's way through the rock, which is the same under every law.
+
+    Returns
+    -------
     depth, turned : Function
         (X, Xd, τ, bit) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8). X and Xd
         are the bit's four states; bit is Ω0, V0 and n.
     rates : Function
         (X, bit) → Z', Φ'.
     """
-    q, c, own = _record(law)
+    c = Coefficients(*[ca.SX.sym(name) for name in Coefficients._fields])
     now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
     delay = ca.SX.sym("delay")
-    contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
     bit = kinematics(c, ca.vertsplit(now), ca.vertsplit(then), delay)
     drives = ca.vertcat(*[getattr(c, name) for name in BIT_COEFFICIENTS])
-    load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
     arguments = [now, then, delay, drives]
     return (
-        ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)]),
         ca.Function("depth", arguments, [bit.depth]),
         ca.Function("turned", arguments, [bit.turned - pitch(c)]),
         ca.Function("rates", [now, drives], [ca.vertcat(*bit.rates)]),
@@ -72,7 +81,7 @@ class MotionArrays(NamedTuple):
     Attributes
     ----------
     q : array
-        Coefficients, then the law's own parameters: what `law_functions` take.
+        Coefficients, then the law's own parameters: what `load_function` takes.
     steady : array, (2,)
         Weight and torque on bit of steady drilling.
     A, E, B, T, C, R : array

@@ -13,7 +13,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.drilling.motion import MotionArrays
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.bounds import rate_bounds
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.compile import kernel, law_address
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.past import Past
@@ -107,7 +107,7 @@ def settings_for(
     whole[data.FED] = data.ROWS + index.size
     return data.Settings(
         bit=structure.bit,
-        q=np.ascontiguousarray(arrays.q),
+        law=(law_address(structure.law), np.ascontiguousarray(arrays.q)),
         whole=np.concatenate([whole, index, fed]),
         real=real,
         value=value,
@@ -263,7 +263,7 @@ def begin(
     steps of a run that is gone on from. The start has passed `check_start`. What bounds the
     motion from there is written into the settings.
     """
-    march, control = (kernel(name, structure.physics) for name in ("march", "control"))
+    march, control = (kernel(name) for name in ("march", "control"))
     standing = (
         _resume(scenario.start, structure, settings, room)
         if isinstance(scenario.start, Past)
@@ -298,7 +298,7 @@ def begin(
 
 def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march before anything."""
-    march = kernel("march", structure.physics)
+    march = kernel("march")
     n, m = structure.arrays.B.shape
     chain = np.zeros(data.LATE, dtype=np.int64)
     following = np.ones(data.DELAYS, dtype=np.int64)
@@ -335,7 +335,7 @@ def _set_off(structure: Structure, settings: data.Settings, start: str, room: in
 
 def _stand_still(standing: March, structure: Structure, settings: data.Settings) -> March:
     """Return a march in which the bit stood still before t = 0, after steady drilling."""
-    march = kernel("march", structure.physics)
+    march = kernel("march")
     row, whole = standing.history.real[1], standing.history.whole[1]
     first, last = structure.stuck(STOOD)
     turn = last - first
@@ -363,9 +363,7 @@ def _look_back(
     known: float = math.inf,
 ) -> None:
     """Set the steps before t = 0, known for so long, at which constant delays look."""
-    march, model, interpolate = (
-        kernel(name, structure.physics) for name in ("march", "model", "interpolate")
-    )
+    march, model, interpolate = (kernel(name) for name in ("march", "model", "interpolate"))
     sets = range(len(settings.schedule))
     longest = max(model.lag_of(settings, i, k) for i in range(3) for k in sets)
     if longest > known:
@@ -378,9 +376,7 @@ def _look_back(
 
 def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march that goes on from what another has left behind."""
-    march, breaks, interpolate = (
-        kernel(name, structure.physics) for name in ("march", "breaks", "interpolate")
-    )
+    march, breaks, interpolate = (kernel(name) for name in ("march", "breaks", "interpolate"))
     steps = len(past.real)
     standing = _blank(structure, settings, steps + room)._replace(first=steps)
     _, history, ints, reals, y, chain, following, _ = standing

@@ -17,7 +17,9 @@ def rig_summary(found: RigCheck, language: Language = SI) -> str:
     """Return what is understood of a rig, for people, in 80 columns."""
     rig, say = found.rig, language.text
     lumped = lump(rig)
-    lines: list[tuple[str, str]] = []
+    slowest = found.torsional[0].frequency
+    told = f"with its top end held the bit swings at {slowest:.3g} Hz, once in {1 / slowest:.3g} s"
+    lines: list[tuple[str, str]] = [("Rig", told)]
     if isinstance(rig, StringRig):
         string, damping = rig.string, rig.string.damping
         assert found.weight_in_air is not None

@@ -131,8 +131,8 @@ class Settings(NamedTuple):
     ----------
     bit : tuple
         Ω0, V0 and n: last argument of `depth`, `turned` and `rates`.
-    q : array
-        Coefficients and the law's own parameters: last argument of `load`.
+    law : (int, array)
+        Address of the law, and the coefficients and its own parameters: last argument of `load`.
     whole : int array
         STATES, ...; LINEAR, ...; ROWS; the list of FED.
     real : array
@@ -157,7 +157,7 @@ class Settings(NamedTuple):
     """
 
     bit: Any
-    q: Any
+    law: Any
     whole: Any
     real: Any
     value: Any

@@ -54,7 +54,8 @@ from .data import (
 )
 from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
 from .jit import entry, inner
-from .physics import depth, load, rates, turned
+from .law import load
+from .physics import depth, rates, turned
 
 
 @inner
@@ -264,7 +265,7 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         mode.axial,
         mode.behind,
         settings.real,
-        settings.q,
+        settings.law,
         probe,
     )
     y[excess] = weight - settings.real[WEIGHT]
@@ -295,7 +296,7 @@ def move(settings, y, out):
 
 
 @entry
-def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, q, probe):
+def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, law, probe):
     """Weight and torque on bit, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
     At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
@@ -313,7 +314,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
         Z' and Φ'.
     contact, torsion, direction, behind : int
         The mode; ``direction`` is the axial one.
-    real, q : array
+    real, law : array, tuple
         As in `Settings`.
     probe : array
         Takes the loads of the rock, and the accelerations at the ends of what they can be.
@@ -329,11 +330,11 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
     weight, torque, pressed = 0.0, 0.0, 0.0
     if contact == 1:
         sign, turning = (-1.0, 0.0) if torsion == REVERSE else (1.0, cut)
-        light = load((turning, 0.0, sign), speeds, q)
-        full = load((turning, 1.0, sign), speeds, q)
+        light = load((turning, 0.0, sign), speeds, law)
+        full = load((turning, 1.0, sign), speeds, law)
         if behind == 1:
-            light = load((cut, 0.0, 1.0), speeds, q)[0], load((0.0, 0.0, sign), speeds, q)[1]
-            full = load((cut, 1.0, 1.0), speeds, q)[0], load((0.0, 1.0, sign), speeds, q)[1]
+            light = load((cut, 0.0, 1.0), speeds, law)[0], load((0.0, 0.0, sign), speeds, law)[1]
+            full = load((cut, 1.0, 1.0), speeds, law)[0], load((0.0, 1.0, sign), speeds, law)[1]
         up, down = axial + by_weight * light[0], axial + by_weight * full[0]
         probe[P_UP], probe[P_DOWN] = up, down
         if direction == DOWN:
@@ -350,7 +351,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
     if torsion == STUCK:
         back = 0.0
         if contact == 1:
-            back = load((0.0, pressed, -1.0), speeds, q)[1]
+            back = load((0.0, pressed, -1.0), speeds, law)[1]
         probe[P_REVERSE] = angular + by_torque * (back - wall)
         whole = -angular / by_torque
         torque = whole if wall == 0.0 else min(max(whole, back), torque)
