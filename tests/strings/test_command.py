@@ -99,12 +99,15 @@ def test_what_does_not_fit_a_run_under_a_drive_is_said_in_one_line(call, argumen
 @pytest.mark.parametrize(
     "verb", [("simulate", "--duration", "0.1 s"), ("analyze",)], ids=lambda verb: verb[0]
 )
-def test_a_top_drive_is_stiff_where_no_law_is_named(call, verb):
-    code, said, error = call(*verb, *WHERE, "--json")
+def test_a_top_drive_is_stiff_where_no_law_is_named(call, tmp_path, verb):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(PIPE.replace("900 m", "300 m") + '[top_drive]\ninertia = "2900 kg*m^2"\n')
+    where = ("--rig", rig, *WHERE[2:])
+    code, said, error = call(*verb, *where, "--json")
     assert code == 0
     assert "top drive is stiff" in error
     stiff, constant = (
-        json.loads(call(*verb, *WHERE, "--json", "--structure", law)[1])
+        json.loads(call(*verb, *where, "--json", "--structure", law)[1])
         for law in ("stiff", "constant-torque")
     )
     fields = json.loads(said)
