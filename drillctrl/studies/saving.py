@@ -42,7 +42,7 @@ def save_result(result: Result, path: str | Path) -> None:
     ----------
     result : Design, Analysis, Simulation, Campaign, Comparison, VibrationMap or RigReport
         The result, of any plant; also a StabilityChart, StabilisableChart or StabilityVolume,
-        a BitResponse, BitBand or DrillingMotion.
+        a BitResponse, BitBand, DrillingMotion, RecordStudy or DriveComparison.
     path : str or Path
         A name that ends in .json.
 
