@@ -126,13 +126,10 @@ def simulate_command(
     if figure not in FIGURES:
         raise InputError("--figure", figure, f"one of {', '.join(FIGURES)}")
     where = read_point(options)
-    from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
-    from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.export import check_export_path, checked_every
     from drillctrl.simulation.run import checked_run, simulate
     from drillctrl.simulation.starts import possible_starts, start_runs
-    from drillctrl.simulation.structure import structure_of
 
     if out is not None:
         check_export_path(out)
@@ -170,8 +167,6 @@ def simulate_command(
         checked_run(checked, **check, model="linear")
     if time_limit is not None:
         common["time_limit"] = checked_number("time_limit", time_limit, 0.0, open_low=True)
-    if not is_compiled(structure_of(as_case(checked)).physics):
-        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     if starts is not None:
         names = read_starts(starts, possible_starts(place, model == "linear"))
         made = start_runs(

@@ -197,5 +197,6 @@ def read_axes(asked: Asked, options: Options) -> tuple[tuple[str, float, float],
 def axis_text(asked: Asked, axis: tuple[str, float, float], count: int | None = None) -> str:
     """Return an axis as the command line takes it."""
     name, low, high = axis
-    unit = {"speed": " rpm", "rop": " m/h"}.get(name, "")
+    quantity = {"speed": "angular_rate", "rop": "axial_rate"}.get(name)
+    unit = "" if quantity is None else f" {asked.language.unit(quantity)}"
     return f"{name}={low:g}:{high:g}{'' if count is None else f':{count}'}{unit}"

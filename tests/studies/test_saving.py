@@ -40,7 +40,7 @@ from drillctrl import (
     vibration_map,
 )
 from drillctrl.base.codec import decode, encode
-from drillctrl.studies import saved_kinds
+from drillctrl.interop import saved_kinds
 
 from ..records.test_fitted_rig import fit_of
 from ..strangers import VelocityWeakening
@@ -152,7 +152,7 @@ def test_what_cannot_be_kept_is_refused(run, tmp_path):
 
 def _sealed(document):
     """The document with the checksum that belongs to it: whoever forges one can make it."""
-    from drillctrl.studies.saving import _checksum
+    from drillctrl.interop.saving import _checksum
 
     return {**document, "checksum": _checksum(document["result"])}
 

@@ -36,7 +36,16 @@ from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.spectrum.multiplicity import Root
-from drillctrl.strings import check, drill_string, drive_control, drives, line, section, slopes
+from drillctrl.strings import (
+    check,
+    drill_string,
+    drive_control,
+    drives,
+    line,
+    section,
+    slopes,
+    wall,
+)
 from drillctrl.strings.drive_measures import DriveMeasures, DriveMode
 from drillctrl.strings.drive_roots import DriveRoot
 from drillctrl.strings.drive_verdict import DriveVerdict
@@ -78,7 +87,7 @@ _PARTS: tuple[type, ...] = (
     *(objectives.Requirements, worst_case.WorstCase, certificate.OptimalityCertificate),
     *(family.ActiveRoot, Drilling, swings.Swing),
     *(controlled_swings.ControlledSwing, controlled_swings.OnMotion),
-    *(drill_string.DrillString, drill_string.Damping, section.Section),
+    *(drill_string.DrillString, drill_string.Damping, section.Section, wall.Wall),
     *(section.Material, section.ToolJoint, drive_control.DriveMachine, WeightControl),
     *(plane.Plane, chains.Curve, regions.Region, scan.ScanLine, Place),
     *(comparison.Row, measures.Response, loop_margins.LoopMargins, radius.StabilityRadius),
