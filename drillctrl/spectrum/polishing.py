@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray
+from drillctrl.delay.reduced import reduced
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 
@@ -17,6 +18,8 @@ EPSILON = float(np.finfo(float).eps)
 _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
 # Relative steps about a root of high multiplicity, at most.
 _ABOUT = 0.05
+# States from which on the matrix is left to the end, and iterations before it at most.
+_MANY, _QUICK = 30, 12
 
 
 def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
@@ -42,10 +45,16 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     s = np.where(start.imag > 0, start, start.real + 0j)
     done = np.zeros(s.shape, dtype=bool)
     last = np.full(s.shape, np.inf)
-    for _ in range(24):
+    # Of many states few numbers tell most digits, and the matrix itself the last ones.
+    loops = reduced(system) if system.order >= _MANY else None
+    for tried in range(1, 25 if loops is None else 25 + _QUICK):
         # What runs away is no number in the end, and does not converge.
         with np.errstate(divide="ignore", invalid="ignore"):
-            newton = 1.0 / characteristic.log_derivative(system, s)
+            if loops is None:
+                newton = 1.0 / characteristic.log_derivative(system, s)
+            else:
+                ratio = loops.evaluate(s[None])[2][0]
+                newton = np.where(np.isfinite(ratio), 1.0 / ratio, 0.0)
         everyone = np.concatenate([s, s[s.imag > 0].conj()]) if s.imag.any() else s
         gap = s[:, None] - everyone
         gap[gap == 0] = np.inf
@@ -66,7 +75,9 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
         # The iteration squares the error relative to the distance of the next root.
         square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
         done |= stalled | square | (size <= 4 * EPSILON * scale)
-        if done.all():
+        if loops is not None and (done.all() or tried == _QUICK):
+            loops, done, last = None, np.zeros_like(done), np.full(s.shape, np.inf)
+        elif done.all():
             break
     scale = 1.0 + np.abs(s)
     # Members of a multiple root may still move about it: where Δ is singular they are it.

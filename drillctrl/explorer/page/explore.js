@@ -348,6 +348,7 @@ function drawRoots(result) {
       return { name: s.name, x: s.x, y: s.y, points: last ? "x" : "o", colour: last ? COLOURS[0] : COLOURS[4] };
     }),
   });
+  if (result.rough) checkSoon();
   panels.roots.tell(result.sentence);
   const verdict = byId("verdict");
   if (verdict.textContent !== result.sentence) verdict.textContent = result.sentence;
@@ -551,7 +552,11 @@ byId("find").addEventListener("click", () => {
 // ---------------------------------------------------------------- what follows what
 
 const follow = {
-  roots: new Follower(panels.roots, "roots", () => ({}), drawRoots),
+  // Analysing a string of pipe takes longer than a drag: its roots are sketched first.
+  roots: new Follower(panels.roots, "roots", () => ({ rough: !known.lumped }), drawRoots),
+  checked: new Follower(panels.roots, "roots", () => { checkedOf = lastPoint; return {}; }, result => {
+    if (checkedOf === lastPoint) drawRoots(result);
+  }),
   nyquist: new Follower(panels.nyquist, "nyquist", () => ({}), drawNyquist),
   reflection: new Follower(panels.reflection, "reflection", () => ({}), drawReflection),
   motion: new Follower(panels.motion, "motion", motionOptions, drawMotion),
@@ -563,6 +568,13 @@ const follow = {
     if (!alone && !known.drive && free === null) askFree();
   }),
 };
+// The point rests: what was sketched is sharpened, counted and certified.
+let checkedOf = "", resting = 0;
+function checkSoon() {
+  clearTimeout(resting);
+  panels.roots.busy("checking …", follow.checked);
+  resting = setTimeout(() => follow.checked.poke(), 250);
+}
 async function askFree() {
   free = false;
   const key = freeFor;
