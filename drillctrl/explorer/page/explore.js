@@ -510,7 +510,7 @@ function drawnStrings(rows) {
     make("text", { x: LEFT - 8, y: y(value) + 4.5, "text-anchor": "end" }, svg, short(value));
     make("line", { x1: LEFT - 5, x2: LEFT, y1: y(value), y2: y(value), stroke: "#1a1a1a" }, svg);
   }
-  make("text", { transform: `translate(14 ${height / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, `depth [${unitOf("depth")}]`);
+  make("text", { x: 4, y: 14 }, svg, `depth [${unitOf("depth")}]`);
   drawn.forEach((row, k) => {
     const middle = LEFT + room * (k + 0.5);
     let top = 0;
