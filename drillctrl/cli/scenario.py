@@ -49,8 +49,8 @@ def controller_options(command: Command) -> Command:
     options = [
         click.option(
             "--structure",
-            help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, "
-            "dynamic-2 …; without it, no control.",
+            help="p, case1, pd, case2, or of a top drive: stiff (default there), soft-torque, "
+            "z-torque, dynamic-2 …; without it, no control.",
         ),
         click.option(
             "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."

@@ -10,7 +10,8 @@ import numpy as np
 
 from drillctrl.base import units
 from drillctrl.base.text import set_out, wrapped
-from drillctrl.drilling.drive import TopDrive
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.drive import CONSTANT_TORQUE, TopDrive
 from drillctrl.drilling.quantities import told_scale
 from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
@@ -44,6 +45,7 @@ def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> di
         "schema": "drillctrl/simulate/1",
         "operating_point": dataclasses.asdict(run.point),
         "structure": controller.feedback.name if controller else None,  # type: ignore[union-attr]
+        "drive": _drive_of(run),
         "model": run.model,
         "cutting": run.cutting,
         "duration": run.duration,
@@ -106,12 +108,24 @@ def _load_lines(run: Simulation) -> list[tuple[str, str]]:
     return lines
 
 
+def _drive_of(run: Simulation) -> str | None:
+    """Return the law of the top drive; None where there is no drive."""
+    if not any(isinstance(block, TopDrive) for block in run.case.physics("a run")[0].blocks):
+        return None
+    law = None if run.controller is None else run.controller.feedback
+    if isinstance(law, FeedbackStructure) and "drive" in law.inputs:
+        return law.name
+    return CONSTANT_TORQUE
+
+
 def _drive_lines(run: Simulation) -> list[tuple[str, str]]:
-    """Say what turns a string whose drive is under no law."""
-    free = any(isinstance(block, TopDrive) for block in run.case.physics("a run")[0].blocks)
-    if run.controller is not None or not free:
+    """Say what turns a string under a top drive."""
+    law = _drive_of(run)
+    if law is None:
         return []
-    return [("Drive", "its torque is constant: no law was given, such as stiff")]
+    if law == CONSTANT_TORQUE:
+        return [("Drive", "its torque is constant: no law was given, such as stiff")]
+    return [("Drive", law)]
 
 
 def _backwards_lines(run: Simulation) -> list[tuple[str, str]]:
