@@ -91,6 +91,8 @@ from .interop.lifted import pade_approximation as pade_approximation
 from .interop.plants import from_control as from_control
 from .interop.responses import loop_frd as loop_frd
 from .interop.responses import to_frd as to_frd
+from .interop.saving import load_result as load_result
+from .interop.saving import save_result as save_result
 from .motion.band import BitBand as BitBand
 from .motion.band import RationalResponse as RationalResponse
 from .motion.band import bit_band as bit_band
@@ -233,8 +235,6 @@ from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
 from .studies.rig_report import RigReport as RigReport
 from .studies.rig_report import rig_report as rig_report
-from .studies.saving import load_result as load_result
-from .studies.saving import save_result as save_result
 from .studies.vibration import VibrationMap as VibrationMap
 from .studies.vibration import vibration_map as vibration_map
 from .studies.vibration_values import Severity as Severity
