@@ -184,7 +184,8 @@ def plot_phase_portrait(
     ax.set_xlabel(right.label)
     ax.set_ylabel(high.label)
     ax.set_title(headline(title or title_of(run), 56), fontsize="medium")
-    ax.legend(loc="best", fontsize="small")
+    # The orbit leaves no corner free.
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, fontsize="small")
     return ax
 
 

@@ -62,6 +62,7 @@ def plot_drives(drives: Mapping[str, Curves], pipe: float, title: str = "") -> F
         damping.axhline(0.0, color=GREY, lw=0.6)
     else:
         damping.set_yscale("log")
+        plain_ticks(damping.yaxis)
     damping.set_ylabel("damping, % of critical")
     damping.set_xscale("log")
     plain_ticks(damping.xaxis)
