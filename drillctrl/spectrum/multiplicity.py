@@ -7,12 +7,10 @@ the k-th root of rounding only.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from drillctrl.base.arrays import ComplexArray
 from drillctrl.delay.system import DelaySystem
@@ -23,16 +21,13 @@ BoolArray = npt.NDArray[np.bool_]
 # as one multiple root: gains are rarely known to more digits.
 MULTIPLICITY_TOLERANCE = 1e-8
 # Below this the split of a cluster is rounding and says nothing about the system.
-_EPSILON = float(np.finfo(float).eps)
-ROUNDING_TOLERANCE = 32 * _EPSILON
+ROUNDING_TOLERANCE = 32 * float(np.finfo(float).eps)
 _CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 # Roots nearer than that, relative, may be one.
 CLOSE = 0.2
 # Share of a cluster's spread by which its members may be off before the circle's are taken.
 _ASTRAY = 1e-2
 _LARGEST_CLUSTER = 24
-# States from which on the smallest singular value is found by itself.
-_MANY = 30
 # A count on a circle that is off by more is disturbed by a root close to it.
 _SHARP_COUNT = 1e-8
 
@@ -97,9 +92,20 @@ def resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root
     return tuple(sorted(roots, key=lambda root: (-root.rightmost, root.imag)))
 
 
+def rightmost(system: DelaySystem, s: ComplexArray) -> float:
+    """Return the largest ``rightmost`` of what `resolve` makes of roots, without the rest."""
+    left = np.argsort(-s.real, kind="stable").tolist()
+    top = -math.inf
+    while left and s[left[0]].real > top:
+        members, root = _cluster(system, s, left[0], left) or ([left[0]], None)
+        top = max(top, float(s[left[0]].real) if root is None else root.rightmost)
+        left = [i for i in left if i not in members]
+    return top
+
+
 def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
     delta, slope = characteristic.matrix_and_derivative(system, np.array(value))
-    left, size, right = _nearly_null(delta)
+    size, left, right = characteristic.nearly_null(delta)
     weight = float(characteristic.weight(system, np.array([value]))[0])
     turn = abs(left.conj() @ slope @ right)
     return Root(
@@ -112,27 +118,6 @@ def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
         weight / max(float(turn), 1e-300),
         converged,
     )
-
-
-def _nearly_null(delta: ComplexArray) -> tuple[ComplexArray, float, ComplexArray]:
-    """Return the smallest singular value of a matrix between its left and right vectors."""
-    if len(delta) >= _MANY:
-        # At a root two inverse iterations do, in a fraction of the time of all values.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
-            factors = scipy.linalg.lu_factor(delta, check_finite=False)
-        right = np.ones(len(delta), dtype=complex)
-        with np.errstate(all="ignore"):
-            for _ in range(3):
-                left = scipy.linalg.lu_solve(factors, right, trans=2, check_finite=False)
-                left /= np.linalg.norm(left)
-                right = scipy.linalg.lu_solve(factors, left, check_finite=False)
-                length = float(np.linalg.norm(right))
-                right /= length
-        if math.isfinite(length) and np.isfinite(right).all():
-            return left, max(1.0 / length, _EPSILON * float(np.abs(delta).max())), right
-    vectors, sizes, others = np.linalg.svd(delta)
-    return vectors[:, -1], float(sizes[-1]), others[-1].conj()
 
 
 def _cluster(

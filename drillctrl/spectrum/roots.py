@@ -21,7 +21,7 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
 from drillctrl.spectrum.climb import MOST_ROOTS, Climb
 from drillctrl.spectrum.count import count_right_of
-from drillctrl.spectrum.multiplicity import CLOSE, Root, resolve
+from drillctrl.spectrum.multiplicity import CLOSE, Root, resolve, rightmost
 from drillctrl.spectrum.parts import parts
 from drillctrl.spectrum.polishing import are_roots, polish
 from drillctrl.spectrum.pseudospectral import (
@@ -209,12 +209,12 @@ def spectral_abscissa(system: DelaySystem) -> float:
     `dominant_roots` for the spread.
     """
     system, unit = _in_own_units(system)
-    s, done, _ = _gather(system, 0.0)
+    s, _, _ = _gather(system, 0.0)
     top = complex(s[0])
     isolated = s.size == 1 or (np.abs(top - s[1:]) > CLOSE * (1.0 + abs(top))).all()
     if isolated and (top.imag == 0 or top.imag > CLOSE):
         return top.real / unit
-    return max(root.rightmost for root in resolve(system, s, done)) / unit
+    return rightmost(system, s) / unit
 
 
 @checks_kinds

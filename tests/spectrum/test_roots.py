@@ -247,8 +247,7 @@ def test_roots_of_many_states_are_those_of_the_matrix_itself(monkeypatch):
     A1[-1, n - 1] = 0.3
     system = DelaySystem(A0, (A1,), (1.3,), np.eye(2 * n)[:, :1], np.eye(2 * n)[:1])
     quick = dominant_roots(system)
-    monkeypatch.setattr("drillctrl.spectrum.polishing._MANY", 1000)
-    monkeypatch.setattr("drillctrl.spectrum.multiplicity._MANY", 1000)
+    monkeypatch.setattr("drillctrl.spectrum.characteristic._FEW_STATES", 1000)
     whole = dominant_roots(system)
     assert len(quick) == len(whole) > 3
     for one, other in zip(quick, whole, strict=True):
