@@ -221,9 +221,12 @@ class DelaySystem:
 
     def rescaled(self) -> DelaySystem:
         """Return `balanced`, to the last factor of 2 even where the norms are small already."""
+        # States that drive no others, or that none drives, would be left as they are.
+        size = self._size()
+        size = size + np.finfo(float).eps * size.max()
         # Scales beyond the integers upset older versions, which look for places among them.
         with np.errstate(invalid="ignore"):
-            _, (scale, _) = scipy.linalg.matrix_balance(self._size(), permute=False, separate=True)
+            _, (scale, _) = scipy.linalg.matrix_balance(size, permute=False, separate=True)
         ratio = scale[None, :] / scale[:, None]
         return replace(
             self,

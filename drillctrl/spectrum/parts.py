@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse.csgraph
 
@@ -28,6 +29,8 @@ def parts(system: DelaySystem) -> tuple[DelaySystem, ...]:
     that no delayed signal reaches or that none is made of, to rounding of its norm. Delays that
     act on nothing are left out.
     """
+    # What is rounding is told by norms, so numbers have to be of like size.
+    system = system.balanced
     late = [k for k, matrix in enumerate(system.delayed) if matrix.any()]
     system = DelaySystem(
         system.A0, tuple(system.delayed[k] for k in late), tuple(system.delays[k] for k in late)
@@ -35,7 +38,7 @@ def parts(system: DelaySystem) -> tuple[DelaySystem, ...]:
     coupled = functools.reduce(np.logical_or, (m != 0.0 for m in (system.A0, *system.delayed)))
     count, member = scipy.sparse.csgraph.connected_components(coupled, connection="strong")
     if count > 1:
-        return _each([_seen(system, np.eye(system.order)[:, member == k]) for k in range(count)])
+        return _each([_block(system, np.flatnonzero(member == k)) for k in range(count)])
     if not late or system.order > _MANY:
         return (system,)
     for matrices in (
@@ -50,6 +53,13 @@ def parts(system: DelaySystem) -> tuple[DelaySystem, ...]:
 
 def _each(systems: list[DelaySystem]) -> tuple[DelaySystem, ...]:
     return tuple(part for system in systems for part in parts(system))
+
+
+def _block(system: DelaySystem, states: npt.NDArray[np.intp]) -> DelaySystem:
+    """Return the block of some states, as it is."""
+    square = np.ix_(states, states)
+    delayed = tuple(matrix[square] for matrix in system.delayed)
+    return DelaySystem(system.A0[square], delayed, system.delays)
 
 
 def _seen(system: DelaySystem, basis: FloatArray) -> DelaySystem:

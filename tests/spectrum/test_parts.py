@@ -119,3 +119,14 @@ def test_a_part_with_no_root_near_the_line():
         assert [root.real for root in characteristic_roots(part, -1.0)] == (
             pytest.approx([ALONE] * many, abs=1e-12)
         )
+
+
+def test_what_is_small_beside_other_parts_is_no_rounding():
+    """λ⁷ (λ − 4) in whole numbers, by hand, with states scaled by up to 10⁸: nothing is delayed."""
+    system = agreement.random_system(42008763)
+    unit = float(system.A0[0, 0]) * -1.0
+    for one in (system, system.balanced):
+        found = np.concatenate([np.linalg.eigvals(part.A0) for part in parts(one)])
+        assert np.sort(np.abs(found)) / unit == pytest.approx([0.0] * 7 + [4.0], abs=1e-3)
+    assert spectral_abscissa(system) / unit == pytest.approx(4.0, rel=1e-9)
+    assert agreement.verdict(system, 1.0) == ("agrees", "")
