@@ -103,10 +103,10 @@ def verdict(system: DelaySystem, further: float) -> tuple[str, str]:
     return "silent", f"line {line!r}: {total} listed, {counted} counted, {len(off)} no roots"
 
 
-def main(first: int, count: int, seconds: float, longest: float) -> int:
+def main(first: int, count: int, seconds: float, shortest: float, longest: float) -> int:
     """Try systems of seeds from ``first`` on; return how many were silently wrong.
 
-    Those whose bound · τ is larger than ``longest`` are passed over.
+    Those whose bound · τ is not between ``shortest`` and ``longest`` are passed over.
     """
     began = time.perf_counter()
     seen: Counter[str] = Counter()
@@ -114,7 +114,7 @@ def main(first: int, count: int, seconds: float, longest: float) -> int:
     for seed in range(first, first + count):
         start = time.perf_counter()
         system = random_system(seed)
-        if turns(system) > longest:
+        if not shortest <= turns(system) <= longest:
             continue
         try:
             kind, told = verdict(system, 1.0)
@@ -138,6 +138,7 @@ if __name__ == "__main__":
     parser.add_argument("--first", type=int, default=0, help="seed of the first system")
     parser.add_argument("--count", type=int, default=100_000, help="how many systems")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
+    parser.add_argument("--shortest", type=float, default=0.0, help="pass over smaller bound · τ")
     parser.add_argument("--longest", type=float, default=1e5, help="pass over larger bound · τ")
     given = parser.parse_args()
     raise SystemExit(1 if main(**vars(given)) else 0)

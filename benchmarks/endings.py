@@ -2,9 +2,9 @@
 
 Table 1 and two tallies at 50-180 rpm and 5-60 m/h, without control and with, under several laws of
 the drive, with limits, lags, delays and sampling, in several rocks and bit laws, from several
-starts, at several tolerances. A run that ends otherwise than by the motion, one that takes more
-steps within a hundredth of its duration than `CROWDED`, and one with a figure that is no number
-are printed with their seed: each is a defect.
+starts, at several tolerances; some strings rub on the wall. A run that ends otherwise than by the
+motion, one that takes more steps within a hundredth of its duration than `CROWDED`, and one with a
+figure that is no number are printed with their seed: each is a defect.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from drillctrl import (
     Scenario,
     Simulation,
     Stribeck,
+    Wall,
     as_case,
     drive_control,
     law_controller,
@@ -88,6 +89,10 @@ def tally(rng: np.random.Generator) -> tuple[Case, Controller | None]:
     assert isinstance(rig, StringRig)
     if rng.random() < 0.3:
         rig = replace(rig, weight_control=WeightControl(20e3, 10.0 ** rng.uniform(-8.0, -6.0)))
+    if rng.random() < 0.4:
+        wall = Wall(rng.uniform(0.1, 0.5), side_force=10.0 ** rng.uniform(0.0, 2.7))
+        sections = tuple(replace(section, wall=wall) for section in rig.string.sections)
+        rig = replace(rig, string=replace(rig.string, sections=sections))
     spin, feed = rng.uniform(50, 180) * RPM, rng.uniform(5, 60) / 3600.0
     machine = string_preset("vertical-3000").drive
     assert machine is not None

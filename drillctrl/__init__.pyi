@@ -93,6 +93,8 @@ from .interop.lifted import pade_approximation as pade_approximation
 from .interop.plants import from_control as from_control
 from .interop.responses import loop_frd as loop_frd
 from .interop.responses import to_frd as to_frd
+from .interop.saving import load_result as load_result
+from .interop.saving import save_result as save_result
 from .motion.band import BitBand as BitBand
 from .motion.band import RationalResponse as RationalResponse
 from .motion.band import bit_band as bit_band
@@ -229,14 +231,13 @@ from .strings.slopes import critical_slopes as critical_slopes
 from .strings.slopes import drive_delay_margin as drive_delay_margin
 from .strings.slopes import mode_slopes as mode_slopes
 from .strings.slopes import weakest_slope as weakest_slope
+from .strings.wall import Wall as Wall
 from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign
 from .studies.compare import compare as compare
 from .studies.comparison import Comparison as Comparison
 from .studies.rig_report import RigReport as RigReport
 from .studies.rig_report import rig_report as rig_report
-from .studies.saving import load_result as load_result
-from .studies.saving import save_result as save_result
 from .studies.vibration import VibrationMap as VibrationMap
 from .studies.vibration import vibration_map as vibration_map
 from .studies.vibration_values import Severity as Severity

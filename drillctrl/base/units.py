@@ -63,6 +63,7 @@ ANGLE = Dimension("an angle", "rad", "'0.1 rad' or '5 deg'")
 NUMBER = Dimension("a plain number", "", "'0.6'")
 DENSITY = Dimension("a density", "kg/m**3", "'1200 kg/m^3' or '10 ppg'")
 LINEAR_DENSITY = Dimension("a weight per length", "kg/m", "'31 kg/m' or '19.5 lb/ft'")
+SIDE_FORCE = Dimension("a force per length", "N/m", "'200 N/m' or '14 lbf/ft'")
 RATE = Dimension("a rate", "1/s", "'0.1 1/s'")
 FEED_GAIN = Dimension("a feed per force", "m/s/N", "'0.2 m/h/kN'")
 TIME = Dimension("a time", "s", "'0.35 s' or '20 ms'")
@@ -98,6 +99,7 @@ _TYPED_MOST = {
     TORSIONAL_DAMPING: {"N*m*s/rad": 1.0},
     DENSITY: {"kg/m**3": 1.0, "kg/m^3": 1.0, "ppg": 0.45359237 / 0.003785411784},
     LINEAR_DENSITY: {"kg/m": 1.0, "lb/ft": 0.45359237 / 0.3048},
+    SIDE_FORCE: {"N/m": 1.0},
     RATE: {"1/s": 1.0},
     TIME: {"s": 1.0, "ms": 1e-3},
 }

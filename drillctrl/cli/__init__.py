@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import sys
 import warnings
 from typing import TextIO
@@ -62,6 +63,9 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its status."""
     for stream in (sys.stdout, sys.stderr):
         _make_writable(stream)
+    logger = logging.getLogger("drillctrl")
+    logger.handlers, logger.propagate = [_Told()], False
+    logger.setLevel(logging.INFO)
     try:
         with warnings.catch_warnings():
             # NumPy remarks on overflow; whether a number can be believed is told otherwise.
@@ -84,6 +88,13 @@ def main(arguments: list[str] | None = None) -> None:
             _fail(f"standard output = {error.strerror}: must be something that can be written to")
         sys.exit(1)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+class _Told(logging.Handler):
+    """Tells on standard error what takes long."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(f"drillctrl: {record.getMessage()}", err=True)
 
 
 def _make_writable(stream: TextIO) -> None:

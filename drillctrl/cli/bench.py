@@ -136,8 +136,6 @@ def _benched(answer: str | None, options: dict[str, Any], line: dict[str, Any]) 
     where = read_point(options)
     from drillctrl.drilling.point import RigPoint
     from drillctrl.hardware.bench import bench, bench_case, checked_signals
-    from drillctrl.simulation.compile import is_compiled
-    from drillctrl.simulation.structure import structure_of
 
     rig = where.rig if isinstance(where, RigPoint) else None
     groups = where.operating_point() if isinstance(where, RigPoint) else where
@@ -158,8 +156,6 @@ def _benched(answer: str | None, options: dict[str, Any], line: dict[str, Any]) 
         _check_signals(table, *checked_signals(case, names["outputs"], names["inputs"]))
     units = (1.0, 1.0) if rig is None else (rig.time_scale, rig.torsional_stiffness)
     law = _law(table, around["period"] * units[0], around.get("limit"), units[1])
-    if not is_compiled(structure_of(case).physics):
-        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     outputs, inputs = checked_signals(case, names["outputs"], names["inputs"])
     return bench(
         where,

@@ -66,6 +66,7 @@ def _has_screen() -> bool:
 
 def _state(where: Any, point: dict[str, Any]) -> dict[str, Any]:
     """Return the state that a window begins with."""
+    from drillctrl.base.language import SI
     from drillctrl.drilling.point import RigPoint
     from drillctrl.explorer.rig_text import rig_as_text
     from drillctrl.strings.files import PRESETS
@@ -75,12 +76,18 @@ def _state(where: Any, point: dict[str, Any]) -> dict[str, Any]:
     source = point["rig"]
     preset = source in PRESETS
     strength = point["rock_strength"]
+    language = where.language if where.language.units else SI
+    if strength is not None:
+        strength = round(language.number("stress", where.rig.rock_strength), 9)
     return {
         "rig": {
             "name": source if preset else Path(source).name,
             "text": None if preset else rig_as_text(source),
         },
+        "units": language.name,
         "speed": round(30.0 / math.pi * where.rotary_speed, 9),
-        "rop": round(3600.0 * where.penetration_rate, 9),
-        "rock_strength": None if strength is None else round(where.rig.rock_strength / 1e6, 9),
+        "rop": round(language.number("axial_rate", where.penetration_rate), 9),
+        "rock_strength": None
+        if strength is None
+        else round(language.number("stress", where.rig.rock_strength), 9),
     }

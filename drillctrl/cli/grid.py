@@ -122,6 +122,7 @@ def _rig_grid(given: dict[str, str], extra: Sequence[Axis]) -> Grid:
     from drillctrl.base import units
     from drillctrl.drilling.plausibility import plausibility_notes
     from drillctrl.strings.files import load_rig
+    from drillctrl.strings.words import wall_note
     from drillctrl.tables.grid import rig_grid
 
     for name in ("rig", "speed"):
@@ -144,9 +145,12 @@ def _rig_grid(given: dict[str, str], extra: Sequence[Axis]) -> Grid:
         if option in given
     }
     speed = _axis("speed", given["speed"], units.ROTARY_SPEED, "rotary_speed")
-    grid = rig_grid(load_rig(given["rig"]), speed, **axes, further=extra)
+    loaded = load_rig(given["rig"])
+    grid = rig_grid(loaded, speed, **axes, further=extra)
     points = [case.rig_point for case in grid.cases]
     notes = dict.fromkeys(n for p in points if p is not None for n in plausibility_notes(p))
+    if (rubs := wall_note(loaded)) is not None:
+        click.echo(f"drillctrl: note: {rubs}", err=True)
     for note in list(notes)[:3]:
         click.echo(f"drillctrl: note: {note}", err=True)
     return grid

@@ -165,9 +165,7 @@ def map_command(
     from drillctrl.base.workers import cores, open_executor
     from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
-    from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.starts import possible_starts
-    from drillctrl.simulation.structure import structure_of
     from drillctrl.studies.tasks import closed_at
     from drillctrl.studies.vibration import vibration_map
     from drillctrl.studies.vibration_edge import held_against
@@ -186,8 +184,6 @@ def map_command(
     held = closed_at(controller or held_against(None, case), case, rig_point, surroundings)[0]
     names = read_starts(starts, possible_starts(held))
     length = read_duration(duration, rig)
-    if not is_compiled(structure_of(as_case(where)).physics):
-        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     with (
         open_executor(workers or cores(), scheduler) as executor,
         nullcontext() if out is None else Checkpoint(f"{out}.checkpoint") as checkpoint,

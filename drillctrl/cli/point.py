@@ -116,6 +116,7 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
     from drillctrl.drilling.point import RigPoint
     from drillctrl.drilling.steady import rig_point_at_weight_on_bit
     from drillctrl.strings.files import load_rig
+    from drillctrl.strings.words import wall_note
 
     for name, permitted in (("rig", "a preset or a TOML file"), ("speed", "such as '120 rpm'")):
         if name not in given:
@@ -135,6 +136,7 @@ def _rig_point(given: dict[str, Any]) -> RigPoint:
         point = rig_point_at_weight_on_bit(rig, speed, weight)
     else:
         point = RigPoint(rig, speed, units.to_si("--rop", given["rop"], units.SPEED))
-    for note in plausibility_notes(point):
+    rubs = wall_note(rig)
+    for note in (*plausibility_notes(point), *([] if rubs is None else [rubs])):
         click.echo(f"drillctrl: note: {note}", err=True)
     return point

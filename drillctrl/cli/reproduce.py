@@ -31,6 +31,8 @@ def reproduce_command(figures: tuple[str, ...], out: str, as_json: bool) -> None
       drillctrl reproduce all --out paper
       drillctrl reproduce fig8 fig14
     """
+    from drillctrl.base.text import WIDTH
+    from drillctrl.paper.agreement import AGREES
     from drillctrl.paper.agreement import as_json as rows_as_json
     from drillctrl.paper.reproduce import reproduce
 
@@ -41,8 +43,9 @@ def reproduce_command(figures: tuple[str, ...], out: str, as_json: bool) -> None
     if as_json:
         click.echo(rows_as_json(rows), nl=False)
         return
+    agreed = sum(row.verdict == AGREES for row in rows)
+    click.echo(f"{agreed} of {len(rows)} statements agree; figures and agreement.md in {out}")
     for row in rows:
         click.echo(f"{row.where}: {row.what}")
         click.echo(f"    paper {row.published}; ours {row.ours}: {row.verdict}")
-        click.echo(textwrap.indent("\n".join(textwrap.wrap(row.why, 92)), "    "))
-    click.echo(f"{len(rows)} statements checked; figures and agreement.md in {out}")
+        click.echo(textwrap.indent("\n".join(textwrap.wrap(row.why, WIDTH - 4)), "    "))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.cli.drive_law import driven_run
+from drillctrl.cli.drive_law import driven_run, meant_structure
 from drillctrl.cli.drives import are_drives
 from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
 from drillctrl.cli.output import check_figure, check_folder
@@ -111,6 +111,8 @@ def simulate_command(
 ) -> None:
     """Try gains, or none, on the nonlinear drill string: stick, slip and bounce.
 
+    The top drive of a rig is stiff unless a law is named, or constant-torque.
+
     \b
     Examples:
       drillctrl simulate --omega0 10 --delta0 2.5 --psi 14 --duration 200 --plot motion.png
@@ -126,13 +128,10 @@ def simulate_command(
     if figure not in FIGURES:
         raise InputError("--figure", figure, f"one of {', '.join(FIGURES)}")
     where = read_point(options)
-    from drillctrl.drilling.case import as_case
     from drillctrl.drilling.point import RigPoint
-    from drillctrl.simulation.compile import is_compiled
     from drillctrl.simulation.export import check_export_path, checked_every
     from drillctrl.simulation.run import checked_run, simulate
     from drillctrl.simulation.starts import possible_starts, start_runs
-    from drillctrl.simulation.structure import structure_of
 
     if out is not None:
         check_export_path(out)
@@ -148,6 +147,7 @@ def simulate_command(
             if given:
                 raise InputError(option, "given", "left out where there is --starts")
     scenario = read_scenario(start, initial, change, groups, rig)
+    options["structure"] = meant_structure(where, options["structure"], options)
     place: Any = where
     checked: Any = groups
     controller: Controller | None
@@ -170,8 +170,6 @@ def simulate_command(
         checked_run(checked, **check, model="linear")
     if time_limit is not None:
         common["time_limit"] = checked_number("time_limit", time_limit, 0.0, open_low=True)
-    if not is_compiled(structure_of(as_case(checked)).physics):
-        click.echo("drillctrl: compiling the simulator, once, in about 20 s ...", err=True)
     if starts is not None:
         names = read_starts(starts, possible_starts(place, model == "linear"))
         made = start_runs(

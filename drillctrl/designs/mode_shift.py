@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from drillctrl.base.arrays import FloatArray
-from drillctrl.delay.closing import close_loop
+from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.closing import feedback_lags, loop_channels
+from drillctrl.delay.reduced import ReducedLoops, reduced_loops
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
 from drillctrl.spectrum import characteristic
@@ -82,14 +83,14 @@ def mode_shifts(
         Rightmost first without control. A root that cannot be followed, because it meets
         another on the way, is left out.
     """
-    found = []
-    for root in dominant_roots(plant):
-        if root.multiplicity == 1 and root.converged:
-            end = _followed(plant, structure, K1, K2, root.value)
-            if end is not None:
-                kind = mode_kind(plant, root.value, quantities)
-                found.append(ModeShift(kind, root.value, complex(end.real, abs(end.imag))))
-    return tuple(found)
+    known = [root for root in dominant_roots(plant) if root.multiplicity == 1]
+    begun = [root.value for root in known if root.converged]
+    ends = _followed(_growing_loop(plant, structure, K1, K2), np.array(begun, dtype=complex))
+    return tuple(
+        ModeShift(mode_kind(plant, start, quantities), start, complex(end.real, abs(end.imag)))
+        for start, end in zip(begun, ends.tolist(), strict=True)
+        if not np.isnan(end)
+    )
 
 
 def mode_kind(plant: DelaySystem, s: complex, quantities: tuple[str, ...]) -> str | None:
@@ -113,41 +114,83 @@ def mode_kind(plant: DelaySystem, s: complex, quantities: tuple[str, ...]) -> st
     return kind if shares[kind] >= 1.0 - _PURE else None
 
 
-def _followed(
-    plant: DelaySystem,
-    structure: FeedbackStructure,
-    K1: FloatArray,
-    K2: FloatArray,
-    start: complex,
-) -> complex | None:
-    """Follow a root by Newton's iteration, with steps as short as the root moves fast."""
-    done, step = 0.0, 1.0 / _SCALES
-    here, slope = start, 0j
-    while done < 1.0:
-        step = min(step, 1.0 - done)
-        scale = done + step
-        system = close_loop(plant, structure, scale * K1, scale * K2)
-        guess = here + slope * step
-        there = _newton(system, guess)
-        if there is None or abs(there - guess) > 0.05 * (1.0 + abs(here)):
-            step *= 0.5
-            if step < _FINEST:
-                return None
-            continue
-        here, slope, done = there, (there - here) / step, scale
-        step *= 1.5
-    return here
+@dataclass(frozen=True, eq=False)
+class _GrowingLoop:
+    """A loop whose gains are t times what they will be.
+
+    Attributes
+    ----------
+    whole : ReducedLoops
+        The single loop at t = 1.
+    own : int
+        Signals that the plant delays itself; the others are fed back.
+    """
+
+    whole: ReducedLoops
+    own: int
+
+    def log_derivative(self, s: ComplexArray, t: FloatArray) -> ComplexArray:
+        """Return (det Δ)'/det Δ at places, each with its own share of the gains, (q,)."""
+        every = self.whole.take(np.zeros(s.size, dtype=np.intp))
+        rank = every.delays.shape[1]
+        scale = np.where(np.arange(rank) < self.own, 1.0, t[:, None])
+        residues = every.residues * np.tile(scale, rank)[:, None, : every.residues.shape[2]]
+        loops = replace(every, left=every.left * scale[:, None], residues=residues)
+        return loops.evaluate(s[:, None])[2][:, 0]
 
 
-def _newton(system: DelaySystem, s: complex) -> complex | None:
-    change = np.inf
+def _growing_loop(
+    plant: DelaySystem, structure: FeedbackStructure, K1: FloatArray, K2: FloatArray
+) -> _GrowingLoop:
+    """Write feedback as signals beside those that the plant delays: no basis changes with t."""
+    plant = plant.balanced
+    drive, measure = loop_channels(plant, structure)
+    lags = feedback_lags(plant, structure)
+    parts = [
+        (left, right, tau) for (left, right), tau in zip(plant.factors, plant.delays, strict=True)
+    ]
+    own = sum(len(right) for _, right, _ in parts)
+    gains = np.array([K1, K2])
+    for lag in sorted(set(lags[gains != 0.0].tolist())):
+        parts.append((drive, ((lags == lag) * gains).sum(axis=0) @ measure, lag))
+    whole = reduced_loops(
+        plant.A0[None],
+        np.hstack([left for left, *_ in parts])[None],
+        np.vstack([right for _, right, _ in parts])[None],
+        np.concatenate([np.full(len(right), lag) for _, right, lag in parts])[None],
+    )
+    return _GrowingLoop(whole, own)
+
+
+def _followed(loop: _GrowingLoop, start: ComplexArray) -> ComplexArray:
+    """Follow roots by Newton's iteration, with steps as short as each moves fast; NaN if lost."""
+    here, slope = start.copy(), np.zeros_like(start)
+    done, step = np.zeros(start.size), np.full(start.size, 1.0 / _SCALES)
+    while True:
+        on = np.flatnonzero((done < 1.0) & (step >= _FINEST))
+        if not on.size:
+            return np.where(done < 1.0, np.nan, here)
+        ahead = np.minimum(step[on], 1.0 - done[on])
+        guess = here[on] + slope[on] * ahead
+        there = _newton(loop, guess, done[on] + ahead)
+        good = np.abs(there - guess) <= 0.05 * (1.0 + np.abs(here[on]))
+        step[on[~good]] = 0.5 * ahead[~good]
+        on, ahead, there = on[good], ahead[good], there[good]
+        slope[on], here[on] = (there - here[on]) / ahead, there
+        done[on] = np.where(ahead < 1.0 - done[on], done[on] + ahead, 1.0)
+        step[on] = 1.5 * ahead
+
+
+def _newton(loop: _GrowingLoop, s: ComplexArray, t: FloatArray) -> ComplexArray:
+    """Return roots near places at shares of the gains; NaN where none is reached."""
+    s = s.copy()
+    change = np.full(s.size, np.inf)
     for _ in range(_NEWTON):
-        slope = characteristic.log_derivative_at(system, s)
-        if slope == 0.0 or np.isnan(slope):
-            return None
-        move = 1.0 / slope
-        s -= move
-        change = abs(move) / (1.0 + abs(s))
-        if change < _SMALL:
-            return s
-    return s if change < _ROUGH else None
+        on = np.flatnonzero(change >= _SMALL)
+        if not on.size:
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = 1.0 / loop.log_derivative(s[on], t[on])
+        s[on] -= move
+        change[on] = np.abs(move) / (1.0 + np.abs(s[on]))
+    return np.where(change < _ROUGH, s, np.nan)

@@ -6,6 +6,7 @@ drive's torque: what soft-torque and impedance-matching speed controllers act on
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,9 @@ from drillctrl.base.errors import checked_number
 from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.string import TOP, String
+
+# What a drive gives that no law turns.
+CONSTANT_TORQUE = "constant-torque"
 
 
 class TopDrive(Block):
@@ -40,8 +44,12 @@ class TopDrive(Block):
 
     def mechanics(self, string: String, c: Coefficients, q: Any) -> String:
         """Return the string whose top end is free to turn."""
-        names = {("phi" if n == TOP[1] else n): what for n, what in string.coordinates.items()}
+
+        def renamed(weights: Mapping[str, Any]) -> dict[str, Any]:
+            return {("phi" if n == TOP[1] else n): w for n, w in weights.items()}
+
         mass = string.mass[:, :]
+        names = renamed(string.coordinates)
         place = list(names).index("phi")
         mass[place, place] = mass[place, place] + q.inertia_ratio * c.inertia
         return replace(
@@ -50,8 +58,9 @@ class TopDrive(Block):
             mass=mass,
             inputs={**string.inputs, "drive": "phi"},
             outputs={
-                name: (quantity, {("phi" if n == TOP[1] else n): w for n, w in weights.items()})
+                name: (quantity, renamed(weights))
                 for name, (quantity, weights) in string.outputs.items()
             },
             imposed=tuple(name for name in string.imposed if name != TOP[1]),
+            sides=tuple(side._replace(weights=renamed(side.weights)) for side in string.sides),
         )

@@ -32,8 +32,8 @@ def _record(law: BitRock) -> tuple[ca.SX, Coefficients, Any]:
     return ca.vertcat(*c, *own.values()), Coefficients(*c), SimpleNamespace(**own)
 
 
-def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
-    """Return the bit in the rock on one branch of its switches, for event-driven use.
+def load_function(law: BitRock) -> ca.Function:
+    """Return the loads of the bit on one branch of its switches, for event-driven use.
 
     Parameters
     ----------
@@ -42,24 +42,33 @@ def law_functions(law: BitRock) -> tuple[ca.Function, ...]:
 
     Returns
     -------
-    load : Function
+    Function
         (contact, rates, q) → weight and torque on bit; see `Contact` and `Rates`.
+    """
+    q, c, own = _record(law)
+    contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
+    load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
+    return ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)])
+
+
+def kinematic_functions() -> tuple[ca.Function, ...]:
+    """Return the bit's way through the rock, which is the same under every law.
+
+    Returns
+    -------
     depth, turned : Function
         (X, Xd, τ, bit) → depth of cut (Eqs. 7, 9); angle turned beyond 2π/n (Eq. 8). X and Xd
         are the bit's four states; bit is Ω0, V0 and n.
     rates : Function
         (X, bit) → Z', Φ'.
     """
-    q, c, own = _record(law)
+    c = Coefficients(*[ca.SX.sym(name) for name in Coefficients._fields])
     now, then = ca.SX.sym("now", BIT_STATES), ca.SX.sym("then", BIT_STATES)
     delay = ca.SX.sym("delay")
-    contact, speeds = ca.SX.sym("contact", 3), ca.SX.sym("rates", 2)
     bit = kinematics(c, ca.vertsplit(now), ca.vertsplit(then), delay)
     drives = ca.vertcat(*[getattr(c, name) for name in BIT_COEFFICIENTS])
-    load = law.load(c, Contact(*ca.vertsplit(contact)), Rates(*ca.vertsplit(speeds)), own)
     arguments = [now, then, delay, drives]
     return (
-        ca.Function("load", [contact, speeds, q], [ca.vertcat(*load)]),
         ca.Function("depth", arguments, [bit.depth]),
         ca.Function("turned", arguments, [bit.turned - pitch(c)]),
         ca.Function("rates", [now, drives], [ca.vertcat(*bit.rates)]),
@@ -72,7 +81,7 @@ class MotionArrays(NamedTuple):
     Attributes
     ----------
     q : array
-        Coefficients, then the law's own parameters: what `law_functions` take.
+        Coefficients, then the law's own parameters: what `load_function` takes.
     steady : array, (2,)
         Weight and torque on bit of steady drilling.
     A, E, B, T, C, R : array
@@ -87,8 +96,10 @@ class MotionArrays(NamedTuple):
         Acts on the bit's states τ0 ago.
     depth : array, (9,)
         c1, c2 and d0 of the linear depth of cut.
-    dragged : tuple of bool
-        As in `Realisation`.
+    drag : array, (n, 2)
+        As in `Realisation`, for all states.
+    side_force, side_rate, side_torque : array, (n, k), (k, n + 1), (k,)
+        As in `Realisation`, for all states.
     """
 
     q: FloatArray
@@ -104,12 +115,15 @@ class MotionArrays(NamedTuple):
     linear: FloatArray
     linear_delayed: FloatArray
     depth: FloatArray
-    dragged: tuple[bool, bool]
+    drag: FloatArray
+    side_force: FloatArray
+    side_rate: FloatArray
+    side_torque: FloatArray
 
-
-@by_form
-def _dragged(plant: Plant) -> tuple[bool, bool]:
-    return expressions(plant).structure.dragged
+    @property
+    def top_torque(self) -> float:
+        """Torque that turns the string in steady drilling."""
+        return float(self.steady[1] + self.side_torque.sum())
 
 
 # Relative stiffness below which a string is free: that of its modes spans five digits.
@@ -127,7 +141,15 @@ def _motion(plant: Plant) -> Evaluator:
     q = ca.vertcat(*[ca.SX(value) for value in (*form.c, *own)])
     depth = ca.horzcat(*linear_depth(plant))
     linear = linearisation(plant)(form.parameters)[:3]
-    return evaluator(form, [q, load, *matrices, depth, *linear, *late])
+    # States of blocks stand behind those of the string.
+    size, (placed, parts) = made.A.shape[0], made.side_force.shape
+    sides = [
+        ca.vertcat(made.side_force, ca.SX(size - placed, parts)),
+        ca.horzcat(made.side_rate[:, :-1], ca.SX(parts, size - placed), made.side_rate[:, -1]),
+        made.side_torque,
+        ca.vertcat(made.drag, ca.SX(size - placed, 2)),
+    ]
+    return evaluator(form, [q, load, *matrices, depth, *linear, *sides, *late])
 
 
 def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
@@ -139,14 +161,15 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
         If axial and torsional structure meet elsewhere than at the bit.
     """
     values = [value[0] for value in _motion(plant)(parameters[None])]
-    q, steady, a, e, b, t, c, r, depth, linear, left, right, inputs, *rest = values
+    q, steady, a, e, b, t, c, r, depth, linear, left, right, *others = values
+    force, rate, friction, drag, inputs, *rest = others
     if e[1, 1] != 0.0 or e[3, 0] != 0.0:
         raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
     late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
     delayed = left @ right[:, :BIT_STATES]
     return MotionArrays(
         q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear, delayed,
-        depth.ravel(), _dragged(plant),
+        depth.ravel(), drag, force, rate, friction.ravel(),
     )  # fmt: skip
 
 
@@ -180,8 +203,16 @@ def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatAr
     return a, a + time * b
 
 
-def rest_state(arrays: MotionArrays) -> FloatArray:
-    """Return the state of an unloaded bit at rest while the top end is at V0 t and Ω0 t, (n,).
+def rest_states(arrays: MotionArrays, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return states of a string at rest without load or strain, (n,) twice.
+
+    They are those just before and after an imposed top end sets off, at V0 t = Ω0 t = 0: what
+    inertia hangs on it moves at once, and the bit stands still.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the states.
 
     Raises
     ------
@@ -189,18 +220,24 @@ def rest_state(arrays: MotionArrays) -> FloatArray:
         If nothing holds the string at its top, as with a drive that is free to turn.
     """
     c = Coefficients(*arrays.q[: len(Coefficients._fields)])
-    follows = np.zeros((len(arrays.A), 4))
+    speeds = np.array([c.penetration_rate, c.rotary_speed])
+    before = np.zeros(len(arrays.A))
     for row, led in zip(arrays.C, arrays.R, strict=True):
         # A state that is an output as it is; those of a drive's law are none.
         if np.count_nonzero(row) == 1 and row.max() == 1.0:
-            follows[row.argmax()] = led
-    places = (follows[:, 0] + follows[:, 2]) != 0.0
-    moving = (follows[:, 1] + follows[:, 3]) != 0.0
-    state = -follows[:, 1] * c.penetration_rate - follows[:, 3] * c.rotary_speed
-    wanted = (arrays.E @ arrays.steady - arrays.A @ state)[moving]
+            before[row.argmax()] = -led[1::2] @ speeds
+    places = [i for i, name in enumerate(names) if f"d{name}" in names]
+    moving = [names.index(f"d{names[i]}") for i in places]
+    # Friction that slides in steady drilling is not there.
+    wanted = arrays.E @ arrays.steady - arrays.side_force @ arrays.side_torque
+    wanted += arrays.T[:, 1::2] @ speeds - arrays.A @ before
     held = arrays.A[np.ix_(moving, places)]
-    found, _, rank, _ = np.linalg.lstsq(held, wanted, rcond=_FREE)
-    if rank < places.sum():
+    found, _, rank, _ = np.linalg.lstsq(held, wanted[moving], rcond=_FREE)
+    if rank < len(places):
         raise InputError("start", "rest", "steady where nothing holds the string at its top")
-    state[places] = found
-    return np.asarray(state)
+    before[places] = found
+    after = before + arrays.drag @ speeds
+    for k, row in enumerate((1, 3)):
+        after += arrays.E[:, k] * (before[row] - after[row]) / arrays.E[row, k]
+        after[row] = before[row]
+    return before, after

@@ -43,9 +43,14 @@ class Realisation:
         Terms that act with a delay.
     input_delays : mapping
         Input → how late it acts, for those that do.
-    dragged : tuple of bool
-        Whether inertia hangs on the imposed motion of the top end, axial and torsional: then
-        its acceleration acts as well, which ``T`` leaves out.
+    drag : SX, (n, 2)
+        What a jump of an imposed speed of the top end, axial or torsional, adds to the states at
+        once where inertia hangs on it: then its acceleration acts, which ``T`` leaves out. On
+        the states of the string without its blocks'.
+    side_force, side_rate, side_torque : SX, (n0, k), (k, n0 + 1), (k, 1)
+        Of friction along the string, on the n0 states that it has without its blocks': what a
+        torque of each part does, its speed by states and by that of an imposed top end, and the
+        most that its torque can be.
     """
 
     states: tuple[Signal, ...]
@@ -59,7 +64,10 @@ class Realisation:
     R: ca.SX
     late: tuple[Late, ...] = ()
     input_delays: Mapping[str, Expression] = field(default_factory=dict)
-    dragged: tuple[bool, bool] = (False, False)
+    drag: ca.SX = field(default_factory=lambda: ca.SX(0, 2))
+    side_force: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
+    side_rate: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    side_torque: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     @property
     def delays_of_inputs(self) -> ca.SX:
@@ -103,7 +111,7 @@ def realise(string: String) -> Realisation:
     free = [i for i, name in enumerate(names) if name not in string.imposed]
     inverse = _inverse(string.mass[free, free])
     count = len(free)
-    a, t = ca.SX(2 * count, 2 * count), ca.SX(2 * count, 4)
+    a, t, drag = (ca.SX(2 * count, width) for width in (2 * count, 4, 2))
     reference = ca.SX(2 * count, 4)
     for i in range(count):
         a[2 * i, 2 * i + 1] = 1
@@ -114,6 +122,7 @@ def realise(string: String) -> Realisation:
             column = names.index(top)
             t[1::2, 2 * k] = -(inverse @ string.stiffness[free, column])
             t[1::2, 2 * k + 1] = -(inverse @ string.damping[free, column])
+            drag[1::2, k] = -(inverse @ string.mass[free, column])
     states = []
     for row, i in enumerate(free):
         quantity = string.coordinates[names[i]]
@@ -124,14 +133,16 @@ def realise(string: String) -> Realisation:
             place = 2 * TOP.index(followed)
             reference[2 * row, place] = 1
             reference[2 * row + 1, place + 1] = 1
-    dragged = [
-        top in string.imposed
-        and any(not entry.is_zero() for entry in string.mass[free, names.index(top)].nonzeros())
-        for top in TOP
-    ]
     load = ca.SX(2 * count, 2)
     for k, coordinate in enumerate(BIT):
         load[1::2, k] = -inverse[:, free.index(names.index(coordinate))]
+    sides = len(string.sides)
+    side_force, side_rate = ca.SX(2 * count, sides), ca.SX(sides, 2 * count + 1)
+    for k, side in enumerate(string.sides):
+        shares = ca.vertcat(*[ca.SX(side.weights.get(names[i], 0.0)) for i in free])
+        side_force[1::2, k], side_rate[k, 1:-1:2] = inverse @ shares, shares.T
+        if TOP[1] in string.imposed:
+            side_rate[k, -1] = side.weights.get(TOP[1], 0.0)
     b = ca.SX(2 * count, len(string.inputs))
     inputs = []
     for k, (name, coordinate) in enumerate(string.inputs.items()):
@@ -143,7 +154,8 @@ def realise(string: String) -> Realisation:
     made = Realisation(
         tuple(states), tuple(inputs), tuple(states), a, load, b, t,
         ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
-        dragged=(dragged[0], dragged[1]),
+        drag=drag, side_force=side_force, side_rate=side_rate,
+        side_torque=ca.vertcat(ca.SX(0, 1), *(side.torque for side in string.sides)),
     )  # fmt: skip
     for name, (quantity, weights) in string.outputs.items():
         # What an imposed end has moved is in the reference of all that hangs from it.

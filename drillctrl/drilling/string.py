@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 
@@ -21,6 +21,21 @@ from drillctrl.drilling.quantities import RATES, checked_quantity
 
 BIT = ("x", "theta")
 TOP = ("x_top", "theta_top")
+
+
+class SideFriction(NamedTuple):
+    """Dry friction of a part of the string on the wall, which acts on its rotation.
+
+    Attributes
+    ----------
+    weights : mapping
+        Coordinate → its share in the angle of that part; 1 in all where all turn as one.
+    torque : expression
+        Of friction while it slides, and the most that holds it at rest.
+    """
+
+    weights: Mapping[str, Expression]
+    torque: Expression
 
 
 @makes_of_kinds
@@ -45,6 +60,9 @@ class String:
     reference : mapping
         Coordinate → top coordinate whose imposed motion is taken off when it is measured;
         by default ``x_top`` for lengths, ``theta_top`` for angles; None for none.
+    sides : tuple of SideFriction
+        Friction on the wall, the first that on the bit's own coordinate. In steady drilling all of
+        it slides; it is no part of small motion.
 
     Raises
     ------
@@ -60,6 +78,7 @@ class String:
     outputs: Mapping[str, tuple[str, Mapping[str, Expression]]] = field(default_factory=dict)
     imposed: tuple[str, ...] = TOP
     reference: Mapping[str, str | None] = field(default_factory=dict)
+    sides: tuple[SideFriction, ...] = ()
 
     def __post_init__(self) -> None:
         names = tuple(self.coordinates)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
+from drillctrl.base.language import FIELD
 from drillctrl.drilling.case import as_case
-from drillctrl.drilling.gain_units import rig_gain_units
+from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.plant import top_drive_plant
 from drillctrl.drilling.structures import soft_torque
-from drillctrl.explorer.state import GROUPS, MOVED_LAWS, Asked
+from drillctrl.explorer.state import GROUPS, MOVED_LAWS, Asked, law_gains
 
 
 def command_line(
@@ -28,7 +29,9 @@ def command_line(
     controlled, placed : bool
         Whether the verb takes the controller, and where the rig drills.
     """
-    where = _point_words(asked) if placed else ["--rig", file_name(asked)]
+    where = ["--rig", file_name(asked), *units_words(asked)]
+    if placed:
+        where = _point_words(asked)
     words = ["drillctrl", verb, *where]
     if controlled:
         words += _controller_words(asked)
@@ -83,10 +86,16 @@ def _point_words(asked: Asked) -> list[str]:
             word for name in GROUPS if name in given for word in (f"--{name}", _number(given[name]))
         ]
     words = ["--rig", file_name(asked), "--speed", f"{_number(given['speed'])} rpm"]
-    words += ["--rop", f"{_number(given['rop'])} m/h"]
+    unit = asked.language.unit
+    words += ["--rop", f"{_number(given['rop'])} {unit('axial_rate')}"]
     if "rock_strength" in given:
-        words += ["--rock-strength", f"{_number(given['rock_strength'])} MPa"]
-    return words
+        words += ["--rock-strength", f"{_number(given['rock_strength'])} {unit('stress')}"]
+    return [*words, *units_words(asked)]
+
+
+def units_words(asked: Asked) -> list[str]:
+    """Return what says the units on a command line, if they are not the usual ones."""
+    return ["--units", "field"] if asked.language is FIELD else []
 
 
 def _controller_words(asked: Asked) -> list[str]:
@@ -96,7 +105,7 @@ def _controller_words(asked: Asked) -> list[str]:
     words = ["--structure", given["structure"]]
     for name in ("K1", "K2"):
         if given.get(name) is not None:
-            units = _units(asked)
+            units = own_units(asked)
             texts = [
                 f"{_number(value)} {unit}".rstrip()
                 for value, unit in zip(given[name], units, strict=True)
@@ -106,18 +115,16 @@ def _controller_words(asked: Asked) -> list[str]:
     return words
 
 
-def _units(asked: Asked) -> list[str]:
-    """Return the SI unit of each gain of one matrix."""
-    if asked.law is not None:
-        scales = rig_gain_units(soft_torque(), top_drive_plant(1.0), asked.rig)
-    else:
+def own_units(asked: Asked) -> list[str]:
+    """Return the unit of each gain of one matrix."""
+    structure, plant = soft_torque(), top_drive_plant(1.0)
+    if asked.law is None:
         assert asked.structure is not None
-        plant, _ = as_case(asked.where).physics("gains")
-        scales = rig_gain_units(asked.structure, plant, asked.rig)
-        if scales is None:
-            return [""] * len(asked.structure.outputs)
-    assert scales is not None
-    return [unit for _, unit in scales[: len(scales) // 2]]
+        structure, (plant, _) = asked.structure, as_case(asked.where).physics("gains")
+    if asked.rig is None:
+        return [""] * len(structure.outputs)
+    (units,) = gain_units(structure, plant, asked.rig)[1]
+    return [asked.language.gain(unit).unit.replace("·", "*") for unit in units]
 
 
 def _point_lines(asked: Asked) -> tuple[list[str], set[str]]:
@@ -127,8 +134,12 @@ def _point_lines(asked: Asked) -> tuple[list[str], set[str]]:
         return [f"point = OperatingPoint({groups})"], {"OperatingPoint"}
     lines = [f"rig = load_rig({file_name(asked)!r})"]
     if "rock_strength" in given:
-        lines.append(f"rig = rig.with_rock_strength({given['rock_strength']!r} * 1e6)")
-    place = f"{given['speed']!r} * pi / 30, {given['rop']!r} / 3600"
+        stress = asked.language.units["stress"].per_si
+        lines.append(f"rig = rig.with_rock_strength({given['rock_strength']!r} / {stress:.16g})")
+    rate = asked.language.units["axial_rate"].per_si
+    place = f"{given['speed']!r} * pi / 30, {given['rop']!r} / {rate:.16g}"
+    if asked.language is FIELD:
+        place += ", units='field'"
     return [*lines, f"point = RigPoint(rig, {place})"], {"RigPoint", "load_rig"}
 
 
@@ -138,7 +149,8 @@ def _law_text(asked: Asked, names: set[str]) -> str:
         names.add("drive_control")
         return f"drive_control({name!r}, rig)"
     names.add("pi_control")
-    return f"pi_control(rig.drive, {-gains[1]!r}, {-gains[0]!r}, name={name!r})"
+    stiffness, damping = law_gains(gains, asked.language)
+    return f"pi_control(rig.drive, {-damping!r}, {-stiffness!r}, name={name!r})"
 
 
 def _gains_text(asked: Asked) -> str:

@@ -7,16 +7,23 @@ from collections.abc import Mapping
 from typing import Any
 
 from drillctrl.base.errors import InputError
+from drillctrl.base.language import FIELD, Language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.gain_units import rig_gain_units
-from drillctrl.drilling.plant import top_drive_plant
 from drillctrl.drilling.plausibility import plausibility_notes
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
-from drillctrl.drilling.structures import STRUCTURE_NAMES, preset_structure, soft_torque
+from drillctrl.drilling.structures import STRUCTURE_NAMES, preset_structure
 from drillctrl.explorer.rig_text import LONGEST, complaints
-from drillctrl.explorer.state import LAWS, MOVED_LAWS, designed_law, read_asked, read_rig
+from drillctrl.explorer.state import (
+    LAWS,
+    MOVED_LAWS,
+    designed_law,
+    read_asked,
+    read_rig,
+    read_units,
+)
 from drillctrl.explorer.views import Options, Tell, stability
 from drillctrl.strings.check import check_rig
 from drillctrl.strings.files import PRESETS
@@ -26,6 +33,8 @@ _LABELS = {"theta": "angle", "dtheta": "speed"}
 # How far a gain of a drive's law may be moved, over that of its rule.
 _REACH = 4.0
 _MOST_RIGS = 8
+# What the page tells by itself.
+_QUANTITIES = ("axial_rate", "stress", "depth", "force", "impedance", "length")
 
 
 def describe(fields: Mapping[str, Any], options: Options, tell: Tell) -> dict[str, Any]:
@@ -39,33 +48,37 @@ def describe(fields: Mapping[str, Any], options: Options, tell: Tell) -> dict[st
         if wrong:
             return {"complaints": [{"line": c.line, "text": c.text} for c in wrong]}
     rig, name = read_rig(given)
+    language = read_units(fields)
+    told = language.units
     notes: tuple[str, ...] = ()
     if rig is not None and isinstance(fields.get("speed"), int | float):
         speed, rop = float(fields["speed"]), float(fields.get("rop") or 0.0)
         if speed > 0.0 and math.isfinite(speed + rop):
-            notes = plausibility_notes(RigPoint(rig, speed * math.pi / 30.0, rop / 3600.0))
+            rate = rop / told["axial_rate"].per_si
+            notes = plausibility_notes(RigPoint(rig, speed * math.pi / 30.0, rate))
     return {
         "complaints": [],
         "name": name,
         "lumped": not isinstance(rig, StringRig),
         "drive": isinstance(rig, StringRig) and rig.drive is not None,
-        "rock_strength": None if rig is None else rig.rock_strength / 1e6,
+        "units": {quantity: told[quantity] for quantity in _QUANTITIES},
+        "rock_strength": None if rig is None else language.number("stress", rig.rock_strength),
         "time_scale": 1.0 if rig is None else rig.time_scale,
-        "structures": _structures(rig),
+        "structures": _structures(rig, language),
         "presets": PRESETS,
         "notes": notes,
     }
 
 
-def _structures(rig: Rig | None) -> list[dict[str, Any]]:
+def _structures(rig: Rig | None, language: Language) -> list[dict[str, Any]]:
     """Return each controller that fits, with its gains."""
     if isinstance(rig, StringRig) and rig.drive is not None:
-        return [_law(name, rig) for name in LAWS]
+        return [_law(name, rig, language) for name in LAWS]
     free: dict[str, Any] = {"name": None, "label": "no control", "gains": []}
-    return [free, *(_at_bit(preset_structure(name), rig) for name in STRUCTURE_NAMES)]
+    return [free, *(_at_bit(preset_structure(name), rig, language) for name in STRUCTURE_NAMES)]
 
 
-def _at_bit(structure: FeedbackStructure, rig: Rig | None) -> dict[str, Any]:
+def _at_bit(structure: FeedbackStructure, rig: Rig | None, language: Language) -> dict[str, Any]:
     point: Any = OperatingPoint(10.0, 1.75, 14.0)
     if rig is not None:
         # Units do not depend on where it drills.
@@ -79,6 +92,7 @@ def _at_bit(structure: FeedbackStructure, rig: Rig | None) -> dict[str, Any]:
         if not is_free:
             continue
         scale, unit = scales[k]
+        told = language.gain(unit.replace("*", "·"))
         output = structure.outputs[k % count]
         delayed = k >= count
         gains.append({
@@ -86,28 +100,30 @@ def _at_bit(structure: FeedbackStructure, rig: Rig | None) -> dict[str, Any]:
             "matrix": "K2" if delayed else "K1",
             "index": k % count,
             "label": f"Torque per {'delayed ' if delayed else ''}{_LABELS[output]}",
-            "unit": unit.replace("*", "·"),
-            "low": float(lower[position]) * scale,
-            "high": float(upper[position]) * scale,
+            "unit": told.unit,
+            "per": told.per_si,
+            "low": float(lower[position]) * scale * told.per_si,
+            "high": float(upper[position]) * scale * told.per_si,
             "value": 0.0,
         })  # fmt: skip
         position += 1
     return {"name": structure.name, "label": structure.name, "gains": gains, "at_bit": True}
 
 
-def _law(name: str, rig: StringRig) -> dict[str, Any]:
+def _law(name: str, rig: StringRig, language: Language) -> dict[str, Any]:
     gains = []
     if name in MOVED_LAWS:
         law = designed_law(name, rig).speed
         proportional, integral = law.numerator[-2:]
-        scales = rig_gain_units(soft_torque(), top_drive_plant(1.0), rig)
-        assert scales is not None
-        for k, (label, value) in enumerate(
-            (("Torque per angle, −Ki", -integral), ("Torque per speed, −Kp", -proportional))
-        ):
+        for k, (label, value, unit) in enumerate((
+            ("Torque per angle, −Ki", -integral, "N·m/rad"),
+            ("Torque per speed, −Kp", -proportional, "N·m·s/rad"),
+        )):  # fmt: skip
+            told = language.gain(unit)
+            value *= told.per_si
             gains.append({
                 "name": f"K1_{k + 1}", "matrix": "K1", "index": k, "label": label,
-                "unit": scales[k][1].replace("*", "·"), "low": _REACH * value, "high": 0.0,
+                "unit": told.unit, "per": told.per_si, "low": _REACH * value, "high": 0.0,
                 "value": value,
             })  # fmt: skip
     return {"name": name, "label": name.replace("-", " "), "gains": gains, "at_bit": False}
@@ -134,9 +150,10 @@ def strings(fields: Mapping[str, Any], options: Options, tell: Tell) -> dict[str
             row["chart"] = stability(asked, options, tell)
         rows.append(row)
     names = [row["name"] for row in rows]
+    units = " --units field" if read_units(fields) is FIELD else ""
     lines = [f"print(check_rig(load_rig({name!r})).to_dict())" for name in names]
     return {
         "rows": rows,
-        "command": "\n".join(f"drillctrl rig check {name!r}" for name in names),
+        "command": "\n".join(f"drillctrl rig check {name!r}{units}" for name in names),
         "python": "\n".join(["from drillctrl import check_rig, load_rig", "", *lines]) + "\n",
     }

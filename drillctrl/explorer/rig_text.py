@@ -6,7 +6,7 @@ import copy
 import functools
 import re
 import tomllib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.drilling.rig import Rig, read_toml, table1
 from drillctrl.strings.files import load_rig, rig_from_data
 from drillctrl.strings.rig import StringRig
-from drillctrl.strings.section import Section
+from drillctrl.strings.saving import section_texts
 
 LONGEST = 200_000
 _MOST_COMPLAINTS = 30
@@ -117,32 +117,9 @@ def rig_as_text(source: str) -> str:
     rig = load_rig(source)
     data = read_toml(source, "a readable TOML file")
     if isinstance(rig, StringRig) and isinstance(data.get("sections"), str):
-        data["sections"] = [_section_fields(section) for section in rig.string.sections]
+        data["sections"] = [section_texts(section) for section in rig.string.sections]
         return tomli_w.dumps(data)
-    return Path(source).read_text(encoding="utf-8")
-
-
-def _section_fields(section: Section) -> dict[str, Any]:
-    own = asdict(section.material)
-    joint = section.tool_joint
-    fields = {
-        "name": section.name,
-        "type": section.kind,
-        "joints": section.joints,
-        "length": f"{section.length!r} m",
-        "outer_diameter": f"{section.outer_diameter!r} m",
-        "inner_diameter": f"{section.inner_diameter!r} m",
-        "density": f"{own['density']!r} kg/m^3",
-        "youngs_modulus": f"{own['elasticity']!r} Pa",
-        "shear_modulus": f"{own['shear']!r} Pa",
-    }
-    if section.weight is not None:
-        fields["weight"] = f"{section.weight!r} kg/m"
-    if joint is not None:
-        fields["tool_joint_outer_diameter"] = f"{joint.outer_diameter!r} m"
-        fields["tool_joint_inner_diameter"] = f"{joint.inner_diameter!r} m"
-        fields["tool_joint_length"] = f"{joint.length!r} m"
-    return fields
+    return Path(source).read_text(encoding="utf-8-sig")
 
 
 def _parsed(text: str, name: str) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy as np
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.workers import cores, open_executor
 from drillctrl.designs.design import design
-from drillctrl.drilling.gain_units import rig_gain_units
-from drillctrl.explorer.commands import command_line, python_text
+from drillctrl.explorer.commands import command_line, own_units, python_text
 from drillctrl.explorer.state import Asked, gain_scale
 from drillctrl.explorer.views import Options, Tell, axis_text, read_axes
 from drillctrl.simulation.outcome import figures
@@ -25,13 +24,13 @@ _SAMPLES = 1500
 # Seconds of wall time after which a motion that follows the hand is broken off.
 PATIENCE = 5.0
 _FEW_NODES, _MOST_NODES = 9, 40
-# Columns of a motion, in units of the field: SI factor and unit.
+# Columns of a motion, and what they are.
 _SHOWN = {
-    "bit_speed": (30.0 / np.pi, "rpm"),
-    "penetration_rate": (3600.0, "m/h"),
-    "weight_on_bit": (1e-3, "kN"),
-    "torque_on_bit": (1e-3, "kN·m"),
-    "control_torque": (1e-3, "kN·m"),
+    "bit_speed": "angular_rate",
+    "penetration_rate": "axial_rate",
+    "weight_on_bit": "force",
+    "torque_on_bit": "torque",
+    "control_torque": "torque",
 }
 
 
@@ -97,11 +96,12 @@ def _columns(asked: Asked, run: Simulation, times: Any) -> list[dict[str, Any]]:
                  "control torque": at.torque}  # fmt: skip
         columns = [{"name": name, "unit": "", "values": values} for name, values in named.items()]
         return [{"name": "time", "unit": "", "values": times}, *columns]
-    rig = run.in_rig_units(times * asked.time_scale)
+    rig, told = run.in_rig_units(times * asked.time_scale), asked.language.units
     columns = [
-        {"name": name.replace("_", " "), "unit": unit, "values": factor * getattr(rig, name)}
-        for name, (factor, unit) in _SHOWN.items()
-    ]
+        {"name": name.replace("_", " "), "unit": told[what].unit,
+         "values": told[what].per_si * getattr(rig, name)}
+        for name, what in _SHOWN.items()
+    ]  # fmt: skip
     return [{"name": "time", "unit": "s", "values": rig.times}, *columns]
 
 
@@ -154,7 +154,7 @@ def gains(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     """Return the best gains within bounds; `design`.
 
     Options are ``bounds``: a pair for each free gain, in the order of the structure's names and
-    in SI with a rig; and ``trials``.
+    in the window's units; and ``trials``.
     """
     if asked.structure is None:
         wanted = "p, case1, pd or case2; a law of a top drive follows from its rule"
@@ -171,7 +171,8 @@ def gains(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
             raise InputError(f"bound of {name}", "something else", "two numbers")
         low, high = (checked_number(f"bound of {name}", v, -1e12, 1e12) for v in pair)
         bounds[name] = (low / flat[k], high / flat[k])
-        words += ["--bound", f"{name}={low!r}:{high!r}{_unit(asked, k)}"]
+        unit = own_units(asked)[k % len(structure.outputs)]
+        words += ["--bound", f"{name}={low!r}:{high!r} {unit}".rstrip()]
     tell(0, 0, "looking for gains")
     trials = bool(options.get("trials"))
     found = design(asked.case, structure, bounds=bounds, trials=trials)
@@ -194,10 +195,3 @@ def gains(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
             "print(result.summary())",
         ),
     }
-
-
-def _unit(asked: Asked, k: int) -> str:
-    assert asked.structure is not None
-    plant, _ = asked.case.physics("gains")
-    scales = rig_gain_units(asked.structure, plant, asked.rig)
-    return "" if scales is None else f" {scales[k][1]}"

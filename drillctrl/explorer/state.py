@@ -12,6 +12,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.language import DIMENSIONLESS, Language, told_language
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Case, as_case
 from drillctrl.drilling.gain_units import gain_units
@@ -51,8 +52,8 @@ class Asked:
     law : DriveControl or None
         Of the top drive.
     given : mapping
-        The numbers as they came: speed in rpm, rop in m/h, rock_strength in MPa, or the groups;
-        gains in SI with a rig.
+        The numbers as they came: speed, rop, rock_strength and gains in the window's units, or
+        the groups.
     """
 
     where: OperatingPoint | RigPoint
@@ -67,6 +68,11 @@ class Asked:
     def rig(self) -> Rig | None:
         """The rig, if there is one."""
         return self.where.rig if isinstance(self.where, RigPoint) else None
+
+    @property
+    def language(self) -> Language:
+        """In which units the window speaks."""
+        return self.where.language if isinstance(self.where, RigPoint) else DIMENSIONLESS
 
     @property
     def time_scale(self) -> float:
@@ -103,10 +109,10 @@ def read_asked(fields: Mapping[str, Any]) -> Asked:
     Parameters
     ----------
     fields : mapping
-        ``rig``: None, or ``name`` and ``text`` (None for a preset); ``speed`` (rpm), ``rop``
-        (m/h), ``rock_strength`` (MPa, None for the rig's own); without a rig the groups;
-        ``structure`` (None for no control); ``K1``, ``K2``: lists, in SI with a rig; None for
-        those of a law's rule.
+        ``rig``: None, or ``name`` and ``text`` (None for a preset); ``units``: ``"si"`` or
+        ``"field"``, of all that follows; ``speed``, ``rop``, ``rock_strength`` (None for the
+        rig's own); without a rig the groups; ``structure`` (None for no control); ``K1``,
+        ``K2``: lists; None for those of a law's rule.
 
     Raises
     ------
@@ -146,11 +152,23 @@ def read_asked(fields: Mapping[str, Any]) -> Asked:
 
 
 def gain_scale(structure: FeedbackStructure, where: OperatingPoint | RigPoint) -> FloatArray:
-    """Return the SI value of each unit gain, (1, p); ones without a rig."""
+    """Return what each unit gain is told as, (1, p); ones without a rig."""
     if not isinstance(where, RigPoint):
         return np.ones((1, len(structure.outputs)))
     plant, _ = as_case(where).physics("gains")
-    return gain_units(structure, plant, where.rig)[0]
+    factors, units = gain_units(structure, plant, where.rig)
+    return factors * [[where.language.gain(unit).per_si for unit in row] for row in units]
+
+
+def read_units(fields: Mapping[str, Any]) -> Language:
+    """Return the units that a window speaks.
+
+    Raises
+    ------
+    InputError
+        If there are none of that name.
+    """
+    return told_language(str(fields.get("units") or "si")[:_LONGEST_NAME])
 
 
 def read_rig(given: Any) -> tuple[Rig | None, str | None]:
@@ -186,16 +204,18 @@ def _where(
             if name not in given:
                 raise InputError(name, "(missing)", "given where there is no rig")
         return OperatingPoint(**given), given
+    language = read_units(fields)
+    rate, stress = language.units["axial_rate"], language.units["stress"]
     speed = checked_number("speed (rpm)", fields.get("speed"), 0.0, 1e4, open_low=True)
-    rop = checked_number("rate of penetration (m/h)", fields.get("rop"), 0.0, 1e4)
+    rop = checked_number(f"rate of penetration ({rate.unit})", fields.get("rop"), 0.0, 1e4)
     given = {"speed": speed, "rop": rop}
     strength = fields.get("rock_strength")
     if strength is not None:
         given["rock_strength"] = checked_number(
-            "rock strength (MPa)", strength, 0.0, 1e5, open_low=True
+            f"rock strength ({stress.unit})", strength, 0.0, 1e5, open_low=True
         )
-        rig = rig.with_rock_strength(given["rock_strength"] * 1e6)
-    return RigPoint(rig, speed * math.pi / 30.0, rop / 3600.0), given
+        rig = rig.with_rock_strength(given["rock_strength"] / stress.per_si)
+    return RigPoint(rig, speed * math.pi / 30.0, rop / rate.per_si, units=language.name), given
 
 
 @functools.lru_cache(maxsize=64)
@@ -208,8 +228,13 @@ def _law(name: str, rig: StringRig, fields: Mapping[str, Any]) -> DriveControl:
     gains = fields.get("K1")
     if gains is None:
         return designed_law(name, rig)
-    stiffness, damping = _numbers("K1", gains, 2)
-    return given_control(name, rig, stiffness, damping)
+    return given_control(name, rig, *law_gains(_numbers("K1", gains, 2), read_units(fields)))
+
+
+def law_gains(told: Sequence[float], language: Language) -> tuple[float, float]:
+    """Return stiffness and damping of a law in N m/rad and N m s/rad."""
+    stiffness, damping = told
+    return stiffness / language.gain("N·m/rad").per_si, damping / language.gain("N·m·s/rad").per_si
 
 
 def _numbers(name: str, given: Any, count: int) -> list[float]:

@@ -116,12 +116,21 @@ class BenchRun:
         unit = "s" if found.units == "SI" else "units of time"
         pace = "lock-step" if self.lockstep else f"{self.speedup:g} times real time"
         samples = len(found)
-        share = f" ({found.missed / samples:.2%})" if samples else ""
-        lines = [
+        lines = []
+        if self.compared is not None:
+            lines.append(("Against", self._comparison()))
+        missed = f"{found.missed} of {samples} samples without an answer in time"
+        lines.append(
+            ("Missed", missed if found.missed or not samples else "none: every answer in time")
+        )
+        if self.simulation is not None and self.simulation.steps:
+            judged = figures(self.simulation)
+            swing = "" if judged.swing is None else f", swing {judged.swing:.3g}"
+            lines.append(("Motion", f"{judged.outcome}{swing}"))
+        lines += [
             ("Loop", f"{', '.join(found.outputs)} -> {', '.join(found.inputs)}, "
              f"every {found.period:.4g} {unit}, {pace}"),
             ("Ended", f"{self.ended}, after {samples} samples in {self.wall_seconds:.3g} s"),
-            ("Missed", f"{found.missed} samples without an answer in time{share}"),
         ]  # fmt: skip
         if not self.lockstep:
             lines.append(("Jitter", _words(_spread(found.lateness), "samples sent late by")))
@@ -138,12 +147,6 @@ class BenchRun:
                 if count
             )
             lines.append(("No answers", f"{told} (counted, and left aside)"))
-        if self.simulation is not None and self.simulation.steps:
-            judged = figures(self.simulation)
-            swing = "" if judged.swing is None else f", swing {judged.swing:.3g}"
-            lines.append(("Motion", f"{judged.outcome}{swing}"))
-        if self.compared is not None:
-            lines.append(("Against", self._comparison()))
         return set_out(lines)
 
     def _comparison(self) -> str:

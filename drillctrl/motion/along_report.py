@@ -9,6 +9,7 @@ from typing import Any
 from drillctrl.base.text import finite_or_none
 from drillctrl.motion.threshold import ModeAlong
 from drillctrl.motion.units import told_units, units_of
+from drillctrl.motion.words import unknown_text
 
 
 def along_fields(found: ModeAlong) -> dict[str, Any]:
@@ -51,35 +52,48 @@ def _along_unit(found: ModeAlong) -> str:
 
 
 def along_summary(found: ModeAlong) -> str:
-    """Return what is told on a terminal of a mode over speed or rate."""
+    """Return what is told on a terminal of a mode over speed or rate, the answer first."""
     units, (factor, unit) = told_units(found.case), found.told
-    own = found.own_value * factor
+    rig = bool(units.rate_name)
     name = unit or {"speed": "ω0", "rate": "V0"}[found.along]
     held = {"speed": "the rate of penetration held", "rate": "the rotary speed held"}[found.along]
     amplitude = statistics.median(each.amplitude for each in found.at)
+    size = f"±{100.0 * amplitude:.2g} %" if rig else f"{amplitude:.2g}"
+    mode = f"Torsional mode {found.number}" if not rig or found.number > 1 else "The string"
+    # Short names of units: the table has one column for each.
+    left = f"damping left{f', {units.response_name}' if rig else ''}"
+    growth = f"growth{', 1/s' if rig else ''}"
     lines = [
-        f"Torsional mode {found.number} at a swing of {amplitude:.2g}, {held}",
-        f"{name:>9} {'damping left':>13} {'growth':>9} {'±':>8}",
+        *_thresholds_told(found),
+        "",
+        f"{mode} at a swing of {size}, {held}",
+        f"{name:>9} {left:>27} {growth:>12} {'±':>8}",
     ]
-    for value, left, each in zip(factor * found.values, found.damping_left, found.at, strict=True):
+    rows = zip(factor * found.values, found.damping_left, found.at, strict=True)
+    for value, damping, each in rows:
         if not math.isfinite(each.error):
-            broken = each.response.broken
-            told = "the bit swings of itself" if broken is None else broken.sentence
-            lines.append(f"{value:9.4g} {told}")
+            lines.append(f"{value:9.4g} {unknown_text(each.response)}")
             continue
-        growth = f"{each.root.real / units.time:9.4f} {each.error / units.time:8.2g}"
-        lines.append(f"{value:9.4g} {left * units.response:13.4g} {growth}")
+        growth = f"{each.root.real / units.time:12.4f} {each.error / units.time:8.2g}"
+        lines.append(f"{value:9.4g} {damping * units.response:27.4g} {growth}")
+    return "\n".join(lines)
+
+
+def _thresholds_told(found: ModeAlong) -> list[str]:
+    factor, unit = found.told
+    own = found.own_value * factor
+    told = []
     for threshold in found.thresholds:
         between = f"between {threshold.low * own:.4g} and {threshold.high * own:.4g}"
-        lines.append(f"Decays {threshold.decays} {threshold.factor * own:.4g} {unit} ({between}).")
-    if not found.thresholds:
+        told.append(f"Decays {threshold.decays} {threshold.factor * own:.4g} {unit} ({between}).")
+    if not told:
         sure = {each.sign for each in found.at} - {0}
         verb = "Decays" if sure == {-1} else "Grows"
-        lines.append(f"{verb} wherever it is sure." if sure else "It is sure nowhere.")
+        told.append(f"{verb} wherever it is sure." if sure else "It is sure nowhere.")
     unsure = [
         value for value, each in zip(factor * found.values, found.at, strict=True) if not each.sign
     ]
     if unsure:
         listed = ", ".join(f"{value:.4g}" for value in unsure)
-        lines.append(f"Not sure at {listed} {unit}: the simulator must decide there.")
-    return "\n".join(lines)
+        told.append(f"Not sure at {listed} {unit}: the simulator must decide there.")
+    return told

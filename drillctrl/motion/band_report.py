@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from drillctrl.base.text import finite_or_none
 from drillctrl.motion.band import BitBand
 from drillctrl.motion.units import told_units, units_of
+from drillctrl.motion.words import theory_lines
 from drillctrl.spectrum.roots import spectral_abscissa
 
 
@@ -42,7 +42,7 @@ def band_fields(found: BitBand) -> dict[str, Any]:
 
 
 def band_summary(found: BitBand) -> str:
-    """Return what is told of a band on a terminal."""
+    """Return what is told of a band on a terminal; of a rig the answer first."""
     units, model = told_units(found.case), found.rational()
     rig = bool(units.rate_name)
     amplitude = sum(each.amplitude for each in found.responses) / len(found.responses)
@@ -52,7 +52,7 @@ def band_summary(found: BitBand) -> str:
         f"{'Hz' if rig else 'ω':>9} {'Re H':>9} {'Im H':>9} {'±':>7}",
     ]
     for each in found.responses:
-        place = each.frequency / units.time / (2.0 * math.pi if rig else 1.0)
+        place = each.frequency / units.turn
         value, error = each.value * units.response, each.error * units.response
         lines.append(f"{place:9.4g} {value.real:9.4g} {value.imag:9.4g} {error:7.2g}")
     growth = spectral_abscissa(found.system()) / units.time
@@ -60,11 +60,26 @@ def band_summary(found: BitBand) -> str:
     told = (
         "cannot be told from the band" if counted is None else f"{counted}, counted with H itself"
     )
+    lines += [
+        f"Rational model: {model.poles.size} poles, within {model.error * units.response:.2g}.",
+        f"Torsional loop with it: growth rate {growth:.4g}{' 1/s' if rig else ''}; growing "
+        f"roots: {told}.",
+    ]
+    if not rig:
+        return "\n".join(lines)
+    ends = [found.responses[k].frequency / units.turn for k in (0, -1)]
+    does = "decay, the slowest" if growth < 0.0 else "GROW, the fastest"
     return "\n".join(
         [
-            *lines,
-            f"Rational model: {model.poles.size} poles, within {model.error * units.response:.2g}.",
-            f"Torsional loop with it: growth rate {growth:.4g}{' 1/s' if rig else ''}; growing "
-            f"roots: {told}.",
+            f"Swings of ±{100.0 * amplitude:.3g} % of the bit's speed {does} by "
+            f"{abs(growth):.3g} 1/s.",
+            f"Damping that the bit adds, {ends[0]:.3g} to {ends[1]:.3g} Hz",
+            f"{'Hz':>9} {units.response_name:>14} {'±':>7}",
+            *(
+                f"{each.frequency / units.turn:9.4g} {each.value.real * units.response:14.4g} "
+                f"{each.error * units.response:7.2g}"
+                for each in found.responses
+            ),
+            *theory_lines(lines),
         ]
     )

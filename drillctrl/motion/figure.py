@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes
+from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes, plain_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,16 +43,21 @@ def plot_damping(
     """
     ax = new_axes(6.4, 4.2) if ax is None else ax
     known = np.isfinite(damping) & np.isfinite(errors)
+    name, of, many = ("swing ±", "%", 100.0) if unit else ("swing A", "share of Ω0", 1.0)
     ax.axhline(0.0, color=GREY, linewidth=0.8)
     ax.errorbar(
-        amplitudes[known], damping[known], errors[known],
+        many * amplitudes[known], damping[known], errors[known],
         color=BLUE, marker="o", markersize=3, linewidth=1.1, capsize=2, label=label,
     )  # fmt: skip
     for kind, amplitude in crossings:
-        told = f"swings by {amplitude:.2g}" if kind == "swing" else f"kick of {amplitude:.2g}"
-        ax.axvline(amplitude, color=ORANGE, linestyle="-" if kind == "swing" else "--", label=told)
+        size = f"{many * amplitude:.2g}{' %' if unit else ''}"
+        told = f"swings by {size}" if kind == "swing" else f"kick of {size}"
+        ax.axvline(
+            many * amplitude, color=ORANGE, linestyle="-" if kind == "swing" else "--", label=told
+        )
     ax.set_xscale("log")
-    ax.set_xlabel(axis_name("swing A of the bit's speed", "share of Ω0"))
+    plain_ticks(ax.xaxis)
+    ax.set_xlabel(axis_name(f"{name} of the bit's speed", of))
     ax.set_ylabel(axis_name("damping left to the mode", unit))
     if title:
         ax.set_title(title, fontsize="medium")
@@ -148,16 +153,18 @@ def plot_response(
     ax = new_axes(6.4, 4.2) if ax is None else ax
     known = np.isfinite(errors)
     ax.axhline(0.0, color=GREY, linewidth=0.8)
-    for part, colour, name in (("real", BLUE, "Re H, damps"), ("imag", ORANGE, "Im H")):
+    damps, leads = ("in phase, damps", "a quarter turn ahead") if unit else ("Re H, damps", "Im H")
+    for part, colour, name in (("real", BLUE, damps), ("imag", ORANGE, leads)):
         ax.errorbar(
             frequencies[known], getattr(values[known], part), errors[known],
             color=colour, marker="o", markersize=3, linestyle="none", capsize=2, label=name,
         )  # fmt: skip
         ax.plot(model[0], getattr(model[1], part), color=colour, linewidth=1.1)
     ax.set_xscale("log")
+    plain_ticks(ax.xaxis)
     cycles = "Hz" if unit else ""
     ax.set_xlabel(axis_name("frequency" if unit else "frequency ω", cycles))
-    ax.set_ylabel(axis_name("H, torque of the bit per speed", unit))
+    ax.set_ylabel(axis_name(f"{'' if unit else 'H, '}torque of the bit per speed", unit))
     ax.set_title(f"the bit's answer, {label}; lines: rational model", fontsize="medium")
     ax.legend(fontsize="small")
     return ax

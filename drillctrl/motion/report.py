@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from drillctrl.base.text import finite_or_none
+from drillctrl.base.text import finite_or_none, wrapped
 from drillctrl.motion.orbit import AxialOrbit
 from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import DrillingMotion, ModeAt, ModeSwing
 from drillctrl.motion.units import Units, told_units, units_of
+from drillctrl.motion.words import asked_text, motion_lines, theory_lines, unknown_text, verdict
 
 
 def motion_fields(
@@ -132,21 +132,41 @@ def _at_fields(each: ModeAt, swing: ModeSwing, units: Units) -> dict[str, Any]:
 
 def motion_summary(found: DrillingMotion) -> str:
     """Return what is told on a terminal."""
+    return _told(found, [])
+
+
+def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
+    """Return what is told of H at frequencies of one's own on a terminal."""
     units = told_units(found.case)
-    lines = [_orbit_text(found.orbit, units)]
-    for swing in found.modes:
-        lines += ["", *_mode_lines(swing, units)]
-    if found.floor is not None:
-        lines += [
-            "",
-            f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else.",
-        ]
-    return "\n".join(lines)
+    rig = bool(units.rate_name)
+    lines = [
+        f"H{f', {units.response_name}' if rig else ''}, of a rotation imposed whole",
+        f"{'Hz' if rig else 'ω':>9} {'A':>7} {'Re H':>9} {'Im H':>9} {'±':>7}",
+    ]
+    for each in responses:
+        place = f"{each.frequency / units.turn:9.4g} {each.amplitude:7.3f}"
+        if each.broken is not None:
+            lines.append(f"{place} {each.broken.sentence}")
+        else:
+            lines.append(f"{place} {_answer_text(each, units)}")
+    return _told(found, lines, [asked_text(each, units) for each in responses])
 
 
-def _orbit_text(orbit: AxialOrbit, units: Units) -> str:
-    """Return what is told of the orbit, in lines of 80 columns."""
-    return textwrap.fill(_orbit_told(orbit, units), 80, break_on_hyphens=False)
+def _told(found: DrillingMotion, asked: list[str], answers: Sequence[str] = ()) -> str:
+    """Return the motion; of a rig in a driller's words, and the theory behind."""
+    units = told_units(found.case)
+    if not units.rate_name:
+        lines = [wrapped(_orbit_told(found.orbit, units))]
+        if asked:
+            lines += ["", *asked]
+        for swing in found.modes:
+            lines += ["", *_mode_lines(swing, units)]
+        if found.floor is not None:
+            told = f"Its torque alone swings the bit's speed by {found.floor:.3g}, beside all else."
+            lines += ["", told] if not asked else []
+        return "\n".join(lines)
+    theory = [*asked, *(line for swing in found.modes for line in _mode_lines(swing, units))]
+    return "\n".join([*motion_lines(found, answers), *theory_lines(theory)])
 
 
 def _orbit_told(orbit: AxialOrbit, units: Units) -> str:
@@ -156,91 +176,39 @@ def _orbit_told(orbit: AxialOrbit, units: Units) -> str:
         return "Axial motion at steady rotation: smooth drilling."
     kind = "does not repeat"
     if orbit.period is not None:
-        kind = f"repeats every {orbit.period * units.time:.4g}{' s' if units.rate_name else ''}"
-    loads = ""
-    if units.rate_name:
-        weight, torque = orbit.weight * units.weight, orbit.torque * units.torque
-        loads = f" ({weight:.3g} {units.weight_name}, {torque:.3g} {units.torque_name})"
+        kind = f"repeats every {orbit.period * units.time:.4g}"
     return (
         f"Axial orbit at steady rotation: {kind}; held {orbit.held:.0%} of the time, off the rock "
         f"{orbit.lifted:.0%}; cuts up to {orbit.deepest:.2f} of smooth drilling; mean weight "
-        f"{orbit.weight_ratio:.3f} and torque {orbit.torque_ratio:.3f} of it{loads}."
+        f"{orbit.weight_ratio:.3f} and torque {orbit.torque_ratio:.3f} of it."
     )
 
 
 def _mode_lines(swing: ModeSwing, units: Units) -> list[str]:
+    """Return a mode as theory has it; a rig is told of its damping and growth elsewhere."""
     mode, rig = swing.mode, bool(units.rate_name)
     place = mode.root.imag / units.time
     frequency = f"{place / (2.0 * math.pi):.3f} Hz" if rig else f"ω = {place:.4g}"
     unit = f" {units.response_name}" if rig else ""
+    rest = f" {'damping left':>13} {'growth':>9} {'±':>8} {'held':>5} {'lifted':>6}"
     lines = [
         f"Torsional mode {mode.number}: {frequency}, own damping "
         f"{mode.damping * units.response:.4g}{unit}",
-        f"{'A':>7} {'Re H':>9} {'Im H':>9} {'±':>7} {'damping left':>13} {'growth':>9} {'±':>8}"
-        f" {'held':>5} {'lifted':>6}",
+        f"{'A':>6} {'Re H':>9} {'Im H':>9} {'±':>7}{'' if rig else rest}",
     ]
     for each in swing.at:
         response = each.response
-        if response.broken is not None:
-            lines.append(f"{each.amplitude:7.3f} {response.broken.sentence}")
-            continue
         if not math.isfinite(response.error):
-            told = f"the bit swings of itself, by {response.rippled:.2g} beside that"
-            lines.append(f"{each.amplitude:7.3f} {told}")
+            lines.append(f"{each.amplitude:6.3f} {unknown_text(response)}")
             continue
-        value, error = response.value * units.response, response.error * units.response
-        left = mode.damping * units.response + value.real
-        numbers = f"{value.real:9.4g} {value.imag:9.4g} {error:7.2g} {left:13.4g}"
-        growth = f"{each.root.real / units.time:9.4f} {each.error / units.time:8.2g}"
+        text = f"{each.amplitude:6.3f} {_answer_text(response, units)}"
+        left = mode.damping + response.value.real
+        growth = f"{left:13.4g} {each.root.real:9.4f} {each.error:8.2g}"
         shares = f"{response.held:5.0%} {response.lifted:6.0%}"
-        lines.append(f"{each.amplitude:7.3f} {numbers} {growth} {shares}")
-    return [*lines, *verdict(swing)]
+        lines.append(text if rig else f"{text} {growth} {shares}")
+    return lines if rig else [*lines, *verdict(swing)]
 
 
-def verdict(swing: ModeSwing) -> list[str]:
-    """Say which swings a mode has, and from which kicks."""
-    told = []
-    sure = [each for each in swing.at if each.sign]
-    if not sure:
-        return ["At no amplitude is it sure whether the mode grows: the simulator must decide."]
-    smallest, largest = sure[0], sure[-1]
-    if smallest.sign < 0:
-        told.append(f"Small swings decay (at A = {smallest.amplitude:.3g}).")
-    else:
-        told.append(f"Small swings grow (at A = {smallest.amplitude:.3g}).")
-    for crossing in swing.crossings:
-        between = f"between {crossing.low:.3g} and {crossing.high:.3g}"
-        told.append(
-            f"Swings by {crossing.amplitude:.3g} of the speed ({between})."
-            if crossing.kind == "swing"
-            else f"A kick beyond {crossing.amplitude:.3g} grows on ({between})."
-        )
-    if largest.sign > 0:
-        told.append(f"Grows at A = {largest.amplitude:.3g} still: until the bit sticks.")
-    unsure = [each.amplitude for each in swing.at if not each.sign]
-    if unsure:
-        listed = ", ".join(f"{a:.3g}" for a in unsure)
-        told.append(f"Not sure at A = {listed}: the simulator must decide there.")
-    return told
-
-
-def responses_summary(found: DrillingMotion, responses: Sequence[BitResponse]) -> str:
-    """Return what is told of H at frequencies of one's own on a terminal."""
-    units = told_units(found.case)
-    rig = bool(units.rate_name)
-    lines = [
-        _orbit_text(found.orbit, units),
-        "",
-        f"H{f', {units.response_name}' if rig else ''}, of a rotation imposed whole",
-        f"{'Hz' if rig else 'ω':>9} {'A':>7} {'Re H':>9} {'Im H':>9} {'±':>7}",
-    ]
-    for each in responses:
-        place = f"{each.frequency / units.turn:9.4g} {each.amplitude:7.3f}"
-        if each.broken is not None:
-            lines.append(f"{place} {each.broken.sentence}")
-            continue
-        value, error = each.value * units.response, each.error * units.response
-        lines.append(f"{place} {value.real:9.4g} {value.imag:9.4g} {error:7.2g}")
-    for swing in found.modes:
-        lines += ["", *_mode_lines(swing, units)]
-    return "\n".join(lines)
+def _answer_text(response: BitResponse, units: Units) -> str:
+    value, error = response.value * units.response, response.error * units.response
+    return f"{value.real:9.4g} {value.imag:9.4g} {error:7.2g}"

@@ -14,6 +14,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.records.fit_values import RecordFit
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.rig import StringRig, string_rig
+from drillctrl.strings.saving import section_texts
 
 _BIT_AND_ROCK = (
     *("rock_strength", "contact_strength", "bit_radius", "wearflat_length"),
@@ -134,28 +135,8 @@ def _string_data(rig: StringRig) -> dict[str, Any]:
     def told(value: float, dimension: units.Dimension) -> str:
         return f"{float(value)!r} {dimension.unit}"
 
-    sections = []
-    for section in string.sections:
-        row: dict[str, Any] = {
-            "name": section.name,
-            "type": section.kind,
-            "length": told(section.length, units.LENGTH),
-            "joints": section.joints,
-            "outer_diameter": told(section.outer_diameter, units.LENGTH),
-            "inner_diameter": told(section.inner_diameter, units.LENGTH),
-        }
-        joint = section.tool_joint
-        if joint is not None:
-            for name in ("outer_diameter", "inner_diameter", "length"):
-                row[f"tool_joint_{name}"] = told(getattr(joint, name), units.LENGTH)
-        if section.weight is not None:
-            row["weight"] = told(section.weight, units.LINEAR_DENSITY)
-        row["youngs_modulus"] = told(section.material.elasticity, units.STRESS)
-        row["shear_modulus"] = told(section.material.shear, units.STRESS)
-        row["density"] = told(section.material.density, units.DENSITY)
-        sections.append(row)
     data: dict[str, Any] = {
-        "sections": sections,
+        "sections": [section_texts(section) for section in string.sections],
         "bit": {
             "diameter": told(2.0 * rig.bit_radius, units.LENGTH),
             "blades": rig.blades,

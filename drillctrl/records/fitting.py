@@ -299,7 +299,10 @@ def _reasons(
     if not (stiffness.known and inertia.known):
         told.append("stiffness and inertia change what is seen alike: the bit hardly swings")
     if not damping.known:
-        told.append("damping and the fall of the bit's torque change what is seen alike")
+        told.append(
+            f"damping cannot be told closer than from {damping.low:.2g} to {damping.high:.2g} 1/s: "
+            "the fall of the bit's torque changes what is seen alike"
+        )
     unknown = [name for name, value in law.items() if not value.known]
     if unknown:
         told.append(f"of the bit's law {', '.join(unknown)} cannot be told at these speeds")

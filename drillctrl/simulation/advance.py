@@ -53,7 +53,7 @@ def go_on(
     March, int
         DONE and the like of `kernel.data`; an interrupt such as Ctrl-C is INTERRUPTED.
     """
-    march = kernel("march", structure.physics)
+    march = kernel("march")
     # Few enough that an interrupt is heard soon.
     tries = TRIES // (len(structure.state_names) + 16)
     try:
@@ -88,7 +88,7 @@ def _room(standing: March, march: ModuleType, duration: float) -> int:
 
 def finished(standing: March, outcome: int, **asked: Any) -> Simulation:
     """Return a march that has stopped as a run; ``asked`` are fields of `Simulation`."""
-    march = kernel("march", asked["structure"].physics)
+    march = kernel("march")
     used = int(standing.ints[march.STEPS])
     status = {
         data.DONE: Status.DONE,

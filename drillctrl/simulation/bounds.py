@@ -36,7 +36,7 @@ def rate_bounds(
     point : OperatingPoint
         Where it starts.
     steady : array, (2,)
-        Weight and torque on bit of steady drilling there.
+        Weight on bit and torque of steady drilling there.
     drive : array, (k, 9)
         As `Scenario.drive` returns it.
     start : array, (n + m,)

@@ -1,9 +1,10 @@
-"""Build the compiled integrator: generated physics beside the kernel modules, in a cache.
+"""Build the compiled integrator and the laws that it calls, in a cache.
 
 Numba caches machine code next to the source file, and looks at that file alone to tell
-whether it changed. So the generated physics and the kernel modules are copied into one folder
-named by a hash of all of them: a change anywhere is a new folder, and a second process finds
-the machine code of the first.
+whether it changed. So the kernel modules and the generated kinematics are copied into one
+folder named by a hash of all of them: a change anywhere is a new folder, and a second process
+finds the machine code of the first. A law has a folder of its own, so the kernel is compiled
+once for all of them.
 """
 
 from __future__ import annotations
@@ -11,16 +12,30 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.util
+import logging
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from types import ModuleType
 
 from drillctrl.base.files import write_text
+from drillctrl.drilling.motion import kinematic_functions
+from drillctrl.simulation.translate import module_of, translate
 
+logger = logging.getLogger("drillctrl")
 PACKAGE = "drillctrl.simulation.kernel"
+# The law as the kernel calls it; see `kernel.law`.
+CALLED = """
+
+@numba.cfunc(
+    "void(f8, f8, f8, f8, f8, CPointer(f8), CPointer(f8))", cache=True, error_model="numpy"
+)
+def law(depth, pressed, sign, axial, rotary, q, loads):
+    loads[0], loads[1] = load((depth, pressed, sign), (axial, rotary), q)
+"""
 
 
 def cache_folder() -> Path:
@@ -41,51 +56,66 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="drillctrl-"))
 
 
-def kernel_sources(physics: str) -> dict[str, str]:
-    """Return file name → source of the kernel package, with the physics that was generated."""
-    import numba
-
+def kernel_sources() -> dict[str, str]:
+    """Return file name → source of the kernel package, with the kinematics that are generated."""
     sources = {
         item.name: item.read_text(encoding="utf-8")
         for item in sorted(resources.files(PACKAGE).iterdir(), key=lambda item: item.name)
         if item.name.endswith(".py")
     }
-    sources["physics.py"] = physics
-    # Machine code of another numba must not be taken for this one's.
-    sources["__init__.py"] += f"\nNUMBA_VERSION = {numba.__version__!r}\n"
+    sources["physics.py"] = module_of(translate(function) for function in kinematic_functions())
     return sources
 
 
-@functools.cache
-def kernel(name: str, physics: str) -> ModuleType:
-    """Return a module of the kernel package, compiled for a law on first use.
-
-    Parameters
-    ----------
-    name : str
-        Name of the module, such as ``"march"``.
-    physics : str
-        Source of the module of the bit's kinematics and its law; see `Structure.physics`.
-    """
-    package = _package(physics)
-    return importlib.import_module(f"{package}.{name}")
-
-
 def package_name(sources: dict[str, str]) -> str:
-    """Return the name of the generated package, which changes with any of its sources."""
-    text = "\0".join(f"{name}\0{source}" for name, source in sources.items())
+    """Return the name of a generated package, which changes with any of its sources."""
+    import numba
+
+    # Machine code of another numba must not be taken for this one's.
+    text = "\0".join([numba.__version__, *(f"{name}\0{sources[name]}" for name in sources)])
     return f"drillctrl_kernel_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
 
-def is_compiled(physics: str) -> bool:
-    """Whether an earlier run has left machine code for a law in the cache."""
-    folder = cache_folder() / package_name(kernel_sources(physics))
-    return any((folder / "__pycache__").glob("march*.nbc"))
+@functools.cache
+def kernel(name: str) -> ModuleType:
+    """Return a module of the kernel package, such as ``"march"``, compiled on first use."""
+    return importlib.import_module(f"{_kernel_package()}.{name}")
 
 
 @functools.cache
-def _package(physics: str) -> str:
-    sources = kernel_sources(physics)
+def _kernel_package() -> str:
+    sources = kernel_sources()
+    folder = cache_folder() / package_name(sources)
+    if not any((folder / "__pycache__").glob("march*.nbc")):
+        logger.info("compiling the simulator, once, in about 40 s ...")
+    return _import_package(sources)
+
+
+class Address(int):
+    """Where the machine code of a law is in this process; in another one it is elsewhere."""
+
+    source: str
+
+    def __reduce__(self) -> tuple[Callable[[str], Address], tuple[str]]:
+        return law_address, (self.source,)
+
+
+@functools.cache
+def law_address(source: str) -> Address:
+    """Return where the machine code of a law is, compiled on first use.
+
+    Parameters
+    ----------
+    source : str
+        Of its function; see `Structure.law`.
+    """
+    package = _import_package({"__init__.py": "", "law.py": module_of([source]) + CALLED})
+    address = Address(importlib.import_module(f"{package}.law").law.address)
+    address.source = source
+    return address
+
+
+def _import_package(sources: dict[str, str]) -> str:
     package = package_name(sources)
     folder = cache_folder() / package
     folder.mkdir(mode=0o700, exist_ok=True)

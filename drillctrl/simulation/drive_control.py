@@ -192,7 +192,7 @@ def simulate_drive(
         wanted = f"{rig.drive.inertia:g}, as the rig's"
         raise InputError("inertia of the drive", law.machine.inertia, wanted)
     torque, time = rig.torsional_stiffness, rig.time_scale
-    steady = float(structure_of(case).arrays.steady[1]) * torque
+    steady = structure_of(case).arrays.top_torque * torque
     controller = SteppedDrive(law)
     around["limit"] = checked_number("limit", law.limit, steady, open_low=True) / torque
     run = SteppedRun(
@@ -233,7 +233,7 @@ def _spare_torque(case: Case, machine: DriveMachine, unit: float) -> float | Non
     """Return the torque that a drive has beyond that of steady drilling, dimensionless."""
     if machine.torque_limit is None:
         return None
-    steady = float(structure_of(case).arrays.steady[1]) * unit
+    steady = structure_of(case).arrays.top_torque * unit
     most = checked_number(
         "torque limit of the drive", machine.torque_limit, steady, 1e9, open_low=True
     )

@@ -76,7 +76,8 @@ def restored_run(kept: Mapping[str, Any]) -> Simulation:
         rtol=asked["rtol"],
         atol=asked["atol"],
     )
-    sizes = len(structure.state_names), len(structure.input_names)
+    sides = int(settings.whole[data.SIDES])
+    sizes = len(structure.state_names), len(structure.input_names), sides
     history = data.History(kept["real"], kept["whole"])
     first = checked_integer("first", kept["first"], 1, max(1, len(history.real)))
     _check_steps(history, sizes, first, asked["duration"])
@@ -87,7 +88,9 @@ def restored_run(kept: Mapping[str, Any]) -> Simulation:
     return Simulation(**rest, structure=structure, settings=settings, history=history, rig=case.rig)
 
 
-def _check_steps(history: data.History, sizes: tuple[int, int], first: int, end: float) -> None:
+def _check_steps(
+    history: data.History, sizes: tuple[int, int, int], first: int, end: float
+) -> None:
     """Refuse steps that do not follow each other, or that point to others than those before."""
     real, whole = history
     rows = len(real)

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
+from drillctrl.drilling.motion import MotionArrays
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.bounds import rate_bounds
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.compile import kernel, law_address
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.past import Past
@@ -56,17 +57,19 @@ def settings_for(
     """Return the `Settings` of a run; ``drive`` is as `Scenario.drive` returns it."""
     arrays = structure.arrays
     n, m = arrays.B.shape
+    sides = 0 if linear else max(0, arrays.side_torque.size - 1)
     p = len(structure.output_names)
     whole, real = np.zeros(data.ROWS, dtype=np.int64), np.zeros(data.LIMITS + 2 * m)
     whole[[data.STATES, data.INPUTS, data.OUTPUTS]] = n, m, p
     whole[data.LINEAR], whole[data.MULTIPLE] = linear, multiple
-    whole[data.BACKWARDS] = backwards
+    whole[data.BACKWARDS], whole[data.SIDES] = backwards, sides
     real[[data.WEIGHT, data.TORQUE]] = arrays.steady
     real[data.CUT] = structure.steady_depth
     real[[data.BY_WEIGHT, data.BY_TORQUE]] = arrays.E[1, 0], arrays.E[3, 1]
+    real[data.WALL] = arrays.side_torque[:1].sum()
     real[[data.RTOL, data.ATOL]] = rtol, atol
     real[data.SCALE : data.LIMITS] = _scales(structure)
-    real[data.BOUNDS : data.SCALE] = real[data.LIMITS :] = np.inf
+    real[data.BOUNDS : data.WALL] = real[data.LIMITS :] = np.inf
     schedule, K1, K2 = np.zeros((1, 2)), np.zeros((1, m, p)), np.zeros((1, m, p))
     fed, noise = np.zeros(0, dtype=np.int64), np.zeros((0, p))
     if linear:
@@ -98,13 +101,13 @@ def settings_for(
             ages = controller.measurement_delay + ages if reach else np.zeros_like(ages)
         schedule = np.column_stack([times, ages])
     rows = _rows(structure, controller, linear)
-    pivots = follow_pivots(rows, structure.state_names)
+    pivots = follow_pivots(rows, structure.state_names, sides)
     whole[data.PIVOT : data.ROWS] = [*pivots, *[-1] * (data.PIVOTS - len(pivots))]
     index, value = _entries(rows)
     whole[data.FED] = data.ROWS + index.size
     return data.Settings(
         bit=structure.bit,
-        q=np.ascontiguousarray(arrays.q),
+        law=(law_address(structure.law), np.ascontiguousarray(arrays.q)),
         whole=np.concatenate([whole, index, fed]),
         real=real,
         value=value,
@@ -112,6 +115,7 @@ def settings_for(
         gains=np.ascontiguousarray(np.stack([K1, K2])[..., fed]),
         drive=drive,
         noise=np.ascontiguousarray(noise[:, fed]),
+        side=np.ascontiguousarray(_side(arrays)[:sides]),
     )
 
 
@@ -120,10 +124,13 @@ def _rows(structure: Structure, controller: Controller | None, linear: bool) -> 
     string = structure.arrays
     n, m = string.B.shape
     p = len(structure.output_names)
-    rows = np.zeros((n + p + 1, data.vector_length(n, m)))
+    sides = 0 if linear else max(0, string.side_torque.size - 1)
+    rows = np.zeros((n + p + 1, data.vector_length(n, m, sides)))
     inputs, top, load = n + 2 * m, n + 3 * m, n + 3 * m + 4
     rows[:n, :n], rows[:n, inputs:top], rows[:n, top:load] = string.A, string.B, string.T
     rows[:n, load : load + 2] = string.E
+    if sides:
+        rows[:n, -sides:] = string.side_force[:, 1:]
     rows[n : n + p, :n], rows[n : n + p, top:load] = string.C, -string.R
     if linear:
         rows[:n, :n], rows[:n, top:load] = string.linear, string.linear_delayed
@@ -153,6 +160,15 @@ def _rough(structure: Structure) -> npt.NDArray[np.bool_]:
     return np.asarray((string.C @ jumps != 0.0).any(axis=1))
 
 
+def _side(string: MotionArrays) -> FloatArray:
+    """Return ``side`` of `Settings`."""
+    force, rate = string.side_force[:, 1:], string.side_rate[1:]
+    free = rate[:, :-1] @ force
+    # What holds the bit turns the string back by as much as friction turns the bit.
+    held = free - np.outer(rate[:, :-1] @ string.E[:, 1], force[3]) / string.E[3, 1]
+    return np.hstack([rate, string.side_torque[1:, None], free, held])
+
+
 def _noise(controller: Controller, names: tuple[str, ...], duration: float) -> FloatArray:
     assert controller.period is not None
     count = max(0.0, (duration - controller.activation) / controller.period) + 2.0
@@ -176,9 +192,9 @@ def _scales(structure: Structure) -> tuple[float, ...]:
     return tuple(float(scale) for scale in scales)
 
 
-def empty_history(room: int, states: int, inputs: int) -> data.History:
+def empty_history(room: int, states: int, inputs: int, sides: int) -> data.History:
     """Return a `History` with room for so many steps."""
-    real = np.zeros((room, data.history_width(states, inputs)))
+    real = np.zeros((room, data.history_width(states, inputs, sides)))
     return data.History(real, np.zeros((room, data.WHOLES), dtype=np.int64))
 
 
@@ -205,7 +221,7 @@ def check_start(
         rest, or a run from the past of another point, plant or model.
     """
     kick = scenario.perturbation(structure.state_names)
-    feed_hangs, turn_hangs = structure.arrays.dragged
+    feed_hangs, turn_hangs = (structure.arrays.drag[:, k].any() for k in range(2))
     for change in scenario.changes:
         for name, hangs in (("penetration_rate", feed_hangs), ("omega0", turn_hangs)):
             if hangs and getattr(change, name) is not None:
@@ -247,7 +263,7 @@ def begin(
     steps of a run that is gone on from. The start has passed `check_start`. What bounds the
     motion from there is written into the settings.
     """
-    march, control = (kernel(name, structure.physics) for name in ("march", "control"))
+    march, control = (kernel(name) for name in ("march", "control"))
     standing = (
         _resume(scenario.start, structure, settings, room)
         if isinstance(scenario.start, Past)
@@ -269,8 +285,10 @@ def begin(
         # What the drive gives at this instant is where its limits of rate begin.
         y[n + m : n + 2 * m] = y[n : n + m]
     if not settings.whole[data.LINEAR]:
-        settings.real[data.BOUNDS : data.SCALE] = rate_bounds(
-            point, structure.arrays.steady, settings.drive, y[: n + m]
+        arrays = structure.arrays
+        loads = np.array([arrays.steady[0], arrays.top_torque])
+        settings.real[data.BOUNDS : data.WALL] = rate_bounds(
+            point, loads, settings.drive, y[: n + m]
         )
     control.take_sample(settings, history, first, ints, reals, 0.0, y)
     work = march.workplace(settings)
@@ -280,14 +298,15 @@ def begin(
 
 def _blank(structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march before anything."""
-    march = kernel("march", structure.physics)
+    march = kernel("march")
     n, m = structure.arrays.B.shape
     chain = np.zeros(data.LATE, dtype=np.int64)
     following = np.ones(data.DELAYS, dtype=np.int64)
     ints, reals = np.zeros(march.LAG0 + 3, dtype=np.int64), np.zeros(march.REALS)
     ints[[march.STEPS, march.I_CONTACT, march.I_PASSES, march.I_LEVEL]] = 1
-    y = np.zeros(data.vector_length(n, m))
-    return March(settings, empty_history(room, n, m), ints, reals, y, chain, following, 1)
+    sides = int(settings.whole[data.SIDES])
+    y = np.zeros(data.vector_length(n, m, sides))
+    return March(settings, empty_history(room, n, m, sides), ints, reals, y, chain, following, 1)
 
 
 def _set_off(structure: Structure, settings: data.Settings, start: str, room: int) -> March:
@@ -296,24 +315,27 @@ def _set_off(structure: Structure, settings: data.Settings, start: str, room: in
     before, y = standing.history.real[0], standing.y
     before[[data.START, data.LENGTH]] = -1.0, 1.0
     if start == "rest":
-        n = len(structure.rest)
-        y[:n] = structure.rest
+        state, after = structure.rest
+        n = len(state)
+        y[:n] = after
         # Until then all moves as one against the frame of steady drilling.
         top = np.array([0.0, -structure.penetration_rate, 0.0, -structure.omega0])
         string = structure.arrays
-        rate = string.A @ y[:n] - string.E @ string.steady + string.T @ top
-        before[data.X : data.X + 2] = y[0] - rate[0], rate[0]
-        before[data.THETA] = y[2]
+        rate = string.A @ state - string.E @ string.steady + string.T @ top
+        rate += string.side_force @ string.side_torque
+        y[y.size - settings.whole[data.SIDES] :] = string.side_torque[1:]
+        before[data.X : data.X + 2] = state[0] - rate[0], rate[0]
+        before[data.THETA] = state[2]
         for i in range(4, n):
             column = data.OTHERS + data.QUARTIC * (i - 4)
-            before[column : column + 2] = y[i] - rate[i], rate[i]
+            before[column : column + 2] = state[i] - rate[i], rate[i]
     standing.history.whole[0, [data.CONTACT, data.PASSES]] = 1
     return _stand_still(standing, structure, settings) if start == "stick" else standing
 
 
 def _stand_still(standing: March, structure: Structure, settings: data.Settings) -> March:
     """Return a march in which the bit stood still before t = 0, after steady drilling."""
-    march = kernel("march", structure.physics)
+    march = kernel("march")
     row, whole = standing.history.real[1], standing.history.whole[1]
     first, last = structure.stuck(STOOD)
     turn = last - first
@@ -341,9 +363,7 @@ def _look_back(
     known: float = math.inf,
 ) -> None:
     """Set the steps before t = 0, known for so long, at which constant delays look."""
-    march, model, interpolate = (
-        kernel(name, structure.physics) for name in ("march", "model", "interpolate")
-    )
+    march, model, interpolate = (kernel(name) for name in ("march", "model", "interpolate"))
     sets = range(len(settings.schedule))
     longest = max(model.lag_of(settings, i, k) for i in range(3) for k in sets)
     if longest > known:
@@ -356,14 +376,14 @@ def _look_back(
 
 def _resume(past: Past, structure: Structure, settings: data.Settings, room: int) -> March:
     """Return a march that goes on from what another has left behind."""
-    march, breaks, interpolate = (
-        kernel(name, structure.physics) for name in ("march", "breaks", "interpolate")
-    )
+    march, breaks, interpolate = (kernel(name) for name in ("march", "breaks", "interpolate"))
     steps = len(past.real)
     standing = _blank(structure, settings, steps + room)._replace(first=steps)
     _, history, ints, reals, y, chain, following, _ = standing
     history.real[:steps], history.whole[:steps] = past.real, past.whole
     y[: past.state.size] = past.state
+    sides = int(settings.whole[data.SIDES])
+    y[y.size - sides :] = past.real[-1, past.real.shape[1] - sides :]
     last = past.whole[-1]
     ints[march.STEPS] = steps
     ints[march.I_CONTACT] = last[data.CONTACT]

@@ -19,7 +19,7 @@ _ROUNDING = 3e-14
 _DENSE = 8
 
 
-def follow_pivots(rows: FloatArray, names: tuple[str, ...]) -> list[int]:
+def follow_pivots(rows: FloatArray, names: tuple[str, ...], sides: int = 0) -> list[int]:
     """Write rows by the rates of the ends where this takes fewer numbers, in place.
 
     Parameters
@@ -28,6 +28,8 @@ def follow_pivots(rows: FloatArray, names: tuple[str, ...]) -> list[int]:
         The matrix of `Settings`; the columns of its pivots are empty.
     names : tuple of str
         Of the n states.
+    sides : int
+        Number of columns behind those of the pivots.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def follow_pivots(rows: FloatArray, names: tuple[str, ...]) -> list[int]:
     pivots = [row for row in pivots if np.count_nonzero(rows[row]) > _DENSE]
     ports = {k for row in pivots for k in (row - 1, row)}
     noise = _ROUNDING * abs(rows).max(axis=0)
-    followed, column = False, rows.shape[1] - data.PIVOTS
+    followed, column = False, rows.shape[1] - data.PIVOTS - sides
     for i in range(len(names)):
         if i in pivots:
             continue

@@ -85,8 +85,8 @@ class SteppedRun:
         )
         self._standing, self._structure, self._steps, self._asked = prepared
         structure = self._structure
-        self._march = kernel("march", structure.physics)
-        self._evaluate = kernel("sample", structure.physics).evaluate
+        self._march = kernel("march")
+        self._evaluate = kernel("sample").evaluate
         # Samples are taken here, not by the march.
         self._standing.reals[self._march.NEXT_SAMPLE] = math.inf
         self.sample, self._outcome, self._elapsed = 0, data.DONE, 0.0

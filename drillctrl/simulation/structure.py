@@ -16,13 +16,11 @@ from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.motion import (
     BIT_COEFFICIENTS,
     MotionArrays,
-    law_functions,
-    rest_state,
+    load_function,
+    rest_states,
     stuck_states,
 )
-from drillctrl.simulation.translate import translate_module
-
-DECORATOR = "@numba.njit(cache=True, error_model='numpy')"
+from drillctrl.simulation.translate import translate
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +33,15 @@ class Structure:
         Of X, which begins with x, x', θ, θ' of the bit; of u; and of C X − R top.
     arrays : MotionArrays
         Of the string and of its linear motion, and the parameters of the law.
-    physics : str
-        Source of the module of the bit's kinematics and its law, which is compiled.
+    law : str
+        Source of the function of the bit's loads, which is compiled.
     """
 
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     arrays: MotionArrays
-    physics: str
+    law: str
 
     @property
     def _c(self) -> Coefficients:
@@ -76,17 +74,17 @@ class Structure:
 
     def is_same(self, other: Structure) -> bool:
         """Whether another string and law move alike."""
-        names = ("q", "A", "E", "B", "T")
+        names = ("q", "A", "E", "B", "T", "side_force", "side_rate", "side_torque")
         # Coefficients that a string has no use for are NaN.
-        return self.physics == other.physics and all(
+        return self.law == other.law and all(
             np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name), equal_nan=True)
             for name in names
         )
 
     @functools.cached_property
-    def rest(self) -> FloatArray:
-        """State of a bit at rest without load, the top end at V0 t = Ω0 t = 0, (n,)."""
-        return rest_state(self.arrays)
+    def rest(self) -> tuple[FloatArray, FloatArray]:
+        """States of a string at rest without load, before and after its top sets off, (n,) each."""
+        return rest_states(self.arrays, self.state_names)
 
     def stuck(self, time: float) -> tuple[FloatArray, FloatArray]:
         """States of a string whose bit stands still: at first, and so long after, (n,) each."""
@@ -102,8 +100,8 @@ class _Form:
 
 
 @functools.lru_cache(maxsize=64)
-def _physics(key: _Form) -> str:
-    return translate_module(law_functions(key.law), DECORATOR)
+def _source(key: _Form) -> str:
+    return translate(load_function(key.law))
 
 
 def structure_of(case: Case) -> Structure:
@@ -125,5 +123,5 @@ def structure_of(case: Case) -> Structure:
         plant.input_names,
         plant.output_names,
         arrays,
-        _physics(_Form(plant.bit.form, plant.bit)),
+        _source(_Form(plant.bit.form, plant.bit)),
     )

@@ -218,7 +218,7 @@ class Trace:
         wanted = np.array([every.index(name) for name in asked], dtype=np.int64)
         places = np.ascontiguousarray(places, dtype=np.int64)
         taken, before = self.history.real.shape[0], self.first - 1
-        evaluate = kernel("sample", self.structure.physics).evaluate
+        evaluate = kernel("sample").evaluate
         rows = np.empty((wanted.size, times.size))
         # Piece by piece, so that an interrupt is heard.
         size = _AT_ONCE // (len(self.state_names) + 16)

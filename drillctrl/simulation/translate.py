@@ -96,7 +96,8 @@ def translate(function: Any) -> str:
     return "\n".join([f"def {function.name()}({arguments}):", *lines, f"    return {result}"])
 
 
-def translate_module(functions: Iterable[Any], decorator: str) -> str:
-    """Return the source of a module with one decorated function for each SX function."""
-    parts = [f"{decorator}\n{translate(function)}\n" for function in functions]
+def module_of(functions: Iterable[str]) -> str:
+    """Return the source of a module of compiled functions, given that of each."""
+    decorator = "@numba.njit(cache=True, error_model='numpy')"
+    parts = [f"{decorator}\n{function}\n" for function in functions]
     return "\n\n".join(["import math\n\nimport numba\n", *parts])

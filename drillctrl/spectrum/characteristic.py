@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import cmath
+import functools
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dgeev
+from scipy.linalg.lapack import dgeev, zgetrf, zgetrs
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
 
 # Beyond this, exp(−s τ) would overflow when squared; such an s lies far left of any line
 # that matters.
 _EXPONENT_LIMIT = 300.0
-# Below so many states a tighter bound saves nothing.
+# Below so many states a tighter bound, or another way to det Δ, saves nothing.
 _FEW_STATES, _SAFE_CONDITION = 20, 1e6
+# With fewer delayed signals to a state det Δ costs less through them.
+_THIN = 0.25
+_INVERSE_ITERATIONS = 3
 # Numbers in one temporary array: 8 MB of complex ones.
 _CHUNK = 500_000
 
@@ -48,8 +53,23 @@ def matrix_and_derivative(
     return delta, slope
 
 
+@functools.lru_cache(maxsize=8)
+def _thin(system: DelaySystem) -> ReducedLoops | None:
+    """Return a system of many states through its few delayed signals; None for others."""
+    signals = sum(right.shape[0] for _, right in system.factors)
+    few = system.order < _FEW_STATES or signals > _THIN * system.order
+    return None if few else reduced(system)
+
+
+def is_thin(system: DelaySystem) -> bool:
+    """Whether a system of many states is evaluated through its few delayed signals."""
+    return _thin(system) is not None
+
+
 def log_derivative_at(system: DelaySystem, s: complex) -> complex:
     """Return `log_derivative` at a single point, with less overhead."""
+    if system.order >= _FEW_STATES:
+        return complex(log_derivative(system, np.array([s]))[0])
     slope: ComplexArray = np.eye(system.order, dtype=complex)
     delta = s * slope - system.A0
     for delay, delayed in zip(system.delays, system.delayed, strict=True):
@@ -65,6 +85,10 @@ def log_derivative_at(system: DelaySystem, s: complex) -> complex:
 def log_derivative(system: DelaySystem, s: npt.ArrayLike) -> ComplexArray:
     """Return d ln det Δ/ds = tr(Δ⁻¹ Δ') for every s; infinite where Δ is singular."""
     points = np.asarray(s, dtype=complex)
+    loops = _thin(system) if system.order >= _FEW_STATES else None
+    if loops is not None:
+        slope = loops.evaluate(points.reshape(1, -1))[2].reshape(points.shape)
+        return np.where(np.isnan(slope), np.inf, slope)
     if points.ndim != 1 or points.size * system.order**2 <= _CHUNK:
         return trace_ratio(*matrix_and_derivative(system, points))
     parts = np.array_split(points, points.size * system.order**2 // _CHUNK + 1)
@@ -154,5 +178,33 @@ def weight(system: DelaySystem, s: ComplexArray) -> FloatArray:
 
 
 def smallest_singular(system: DelaySystem, s: ComplexArray) -> FloatArray:
-    """Smallest singular value of Δ for every s: 0 at a root."""
-    return np.asarray(np.linalg.svd(matrix(system, s), compute_uv=False)[..., -1])
+    """Smallest singular value of Δ for every s, 0 at a root; of many states an estimate.
+
+    It is never less than the value, and is it where Δ is nearly singular.
+    """
+    delta = matrix(system, s)
+    if system.order < _FEW_STATES:
+        return np.asarray(np.linalg.svd(delta, compute_uv=False)[..., -1])
+    each = [nearly_null(one)[0] for one in delta.reshape(-1, *delta.shape[-2:])]
+    return np.asarray(each).reshape(delta.shape[:-2])
+
+
+def nearly_null(delta: ComplexArray) -> tuple[float, ComplexArray, ComplexArray]:
+    """Return the smallest singular value of a matrix and its left and right vectors, (n,).
+
+    Of a large one by inverse iteration, which is exact where it is nearly singular.
+    """
+    if len(delta) >= _FEW_STATES:
+        factors, pivots, info = zgetrf(delta)
+        if info == 0:
+            left = np.ones(len(delta), dtype=complex)
+            for _ in range(_INVERSE_ITERATIONS):
+                right = zgetrs(factors, pivots, left)[0]
+                right /= np.linalg.norm(right)
+                left = zgetrs(factors, pivots, right, trans=2)[0]
+                size = 1.0 / float(np.linalg.norm(left))
+                left *= size
+            if np.isfinite(size):
+                return size, left, right
+    left, sizes, right = np.linalg.svd(delta)
+    return float(sizes[-1]), left[:, -1], right[-1].conj()

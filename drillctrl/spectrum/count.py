@@ -152,7 +152,7 @@ def follow(loops: _Loops, line: float, bound: float) -> Followed:
     if not traced.undecided[0]:
         turn = np.array([traced.turn.sum()])
         total = _total(loops, line, traced.omega[-1:], traced.phase[-1:], turn)
-        whole = round(float(total[0]))
+        whole = round(float(total[0])) if np.isfinite(total[0]) else -1
         count = whole if abs(float(total[0]) - whole) < 1e-3 and whole >= 0 else None
     result = RootCount(line, count, float(limit[0]), traced.omega.size)
     return Followed(result, traced.omega, traced.slope)
@@ -296,11 +296,13 @@ def _argument_beyond(loops: _Loops, line: float, omega: FloatArray) -> FloatArra
         # Each is below asin (1/k) with k = _NEAR.
         return np.zeros(loops.count)
     s = _up(line, omega)
-    share = np.eye(loops.order) - loops.matrices(s[:, None])[:, 0] / s[:, None, None]
-    # With |μ| below 1/4 three terms of the logarithm suffice for hundreds of states.
-    square = share @ share
-    powers = np.trace(share, axis1=1, axis2=2) + np.trace(square, axis1=1, axis2=2) / 2.0
-    powers = powers + np.einsum("nij,nji->n", square, share) / 3.0
+    # With |μ| below 1/4 three terms of the logarithm suffice for hundreds of states. Far to the
+    # left numbers may be too large for that: what is NaN counts nothing.
+    with np.errstate(over="ignore", invalid="ignore"):
+        share = np.eye(loops.order) - loops.matrices(s[:, None])[:, 0] / s[:, None, None]
+        square = share @ share
+        powers = np.trace(share, axis1=1, axis2=2) + np.trace(square, axis1=1, axis2=2) / 2.0
+        powers = powers + np.einsum("nij,nji->n", square, share) / 3.0
     return np.asarray(-powers.imag)
 
 

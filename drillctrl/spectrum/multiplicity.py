@@ -92,18 +92,29 @@ def resolve(system: DelaySystem, s: ComplexArray, done: BoolArray) -> tuple[Root
     return tuple(sorted(roots, key=lambda root: (-root.rightmost, root.imag)))
 
 
+def rightmost(system: DelaySystem, s: ComplexArray) -> float:
+    """Return the largest ``rightmost`` of what `resolve` makes of roots, without the rest."""
+    left = np.argsort(-s.real, kind="stable").tolist()
+    top = -math.inf
+    while left and s[left[0]].real > top:
+        members, root = _cluster(system, s, left[0], left) or ([left[0]], None)
+        top = max(top, float(s[left[0]].real) if root is None else root.rightmost)
+        left = [i for i in left if i not in members]
+    return top
+
+
 def _simple_root(system: DelaySystem, value: complex, converged: bool) -> Root:
     delta, slope = characteristic.matrix_and_derivative(system, np.array(value))
-    left, sizes, right = np.linalg.svd(delta)
+    size, left, right = characteristic.nearly_null(delta)
     weight = float(characteristic.weight(system, np.array([value]))[0])
-    turn = abs(left[:, -1].conj() @ slope @ right[-1].conj())
+    turn = abs(left.conj() @ slope @ right)
     return Root(
         float(value.real),
         float(value.imag),
         1,
         0.0,
         float(value.real),
-        float(sizes[-1]) / weight,
+        size / weight,
         weight / max(float(turn), 1e-300),
         converged,
     )

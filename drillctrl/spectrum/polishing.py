@@ -15,8 +15,13 @@ EPSILON = float(np.finfo(float).eps)
 # An iteration that comes to rest with steps larger than this has found a multiple root, or
 # nothing: at a root Δ is singular to so much.
 _ROUGH_STEP, _SINGULAR = 1e-7, 1e-12
+# How many roots of a system of many states are sharpened at last, and by how much at most.
+_SHARPENED, _ROUNDED = 8, 1e-9
 # Relative steps about a root of high multiplicity, at most.
 _ABOUT = 0.05
+# Radius of a circle about it, over 1/τ, at most.
+_CIRCLED = 0.3
+_CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 
 
 def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
@@ -36,6 +41,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     converged : bool array, (q,)
         Whether the last correction was at the level of rounding.
     """
+    if not start.size:
+        return start, np.zeros(0, dtype=bool)
     if start.size == 1:
         value, converged = _polish_one(system, complex(start[0]))
         return np.array([value]), np.array([converged])
@@ -62,7 +69,8 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
                 step *= np.minimum(1.0, 0.3 * scale / np.maximum(size, 1e-300))
         s = s - step
         s.imag = np.abs(s.imag)
-        last = size
+        # What is done keeps its last correction, by which it is judged below.
+        last = np.where(done, last, size)
         # The iteration squares the error relative to the distance of the next root.
         square = size**2 <= EPSILON * scale * np.abs(gap).min(axis=1)
         done |= stalled | square | (size <= 4 * EPSILON * scale)
@@ -76,7 +84,38 @@ def polish(system: DelaySystem, start: ComplexArray) -> tuple[ComplexArray, npt.
     rough = np.flatnonzero(still | (done & (met | (last > _ROUGH_STEP * scale))))
     if rough.size:
         done[rough] = are_roots(system, s[rough])
-    return s, done
+        rough = rough[done[rough]]
+        done[rough] = _are_beside_roots(system, s[rough])
+    return _sharpened(system, s, done), done
+
+
+def _sharpened(system: DelaySystem, s: ComplexArray, done: npt.NDArray[np.bool_]) -> ComplexArray:
+    """Return roots of a system of many states with a last step by Δ itself, the rightmost."""
+    if not characteristic.is_thin(system):
+        return s
+    some = np.flatnonzero(done)
+    some = some[np.argsort(-s.real[some])][:_SHARPENED]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = 1.0 / characteristic.trace_ratio(
+            *characteristic.matrix_and_derivative(system, s[some])
+        )
+    # Next to another root the step is that of a multiple one: as good as it was.
+    small = np.abs(step) < _ROUNDED * (1.0 + np.abs(s[some]))
+    s[some] -= np.where(small, step, 0.0)
+    s.imag = np.where(s.imag < 0.0, 0.0, s.imag)
+    return s
+
+
+def _are_beside_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:
+    """Whether circles about places have roots inside.
+
+    Where exp(−sτ) is huge Δ may be singular to rounding, and no root anywhere near.
+    """
+    scale = 1.0 + np.abs(s)
+    widest = _CIRCLED / system.max_delay if system.delays else np.inf
+    ring = np.minimum(_ABOUT * scale, widest)[:, None] * _CIRCLE
+    slope = characteristic.log_derivative(system, (s[:, None] + ring).ravel())
+    return np.asarray((slope.reshape(ring.shape) * ring).mean(axis=1).real > 0.5)
 
 
 def are_roots(system: DelaySystem, s: ComplexArray) -> npt.NDArray[np.bool_]:

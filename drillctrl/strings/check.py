@@ -100,6 +100,7 @@ class RigCheck:
             },
             "sections": [_section_fields(section) for section in _sections(self.rig)],
             "drive": _drive_fields(self.rig),
+            "wall_torque": self.rig.string.wall_torque if isinstance(self.rig, StringRig) else 0.0,
         }
 
 

@@ -126,12 +126,25 @@ class DrillString:
     @property
     def submerged_weight(self) -> float:
         """Weight in the mud, N."""
-        return STANDARD_GRAVITY * sum(
-            section.length
-            * section.mass_per_metre
-            * max(1.0 - self.mud_density / section.material.density, 0.0)
-            for section in self.sections
+        return sum(section.length * self.buoyed(section) for section in self.sections)
+
+    def buoyed(self, section: Section) -> float:
+        """Return the weight of a section in the mud, N/m."""
+        lift = max(1.0 - self.mud_density / section.material.density, 0.0)
+        return STANDARD_GRAVITY * section.mass_per_metre * lift
+
+    @functools.cached_property
+    def wall_torques(self) -> tuple[tuple[float, float], ...]:
+        """Length, m, and torque on the wall per metre, N, of each section from the top down."""
+        return tuple(
+            (s.length, s.wall.torque(self.buoyed(s), 0.5 * s.widest) if s.wall else 0.0)
+            for s in self.sections
         )
+
+    @property
+    def wall_torque(self) -> float:
+        """Torque of friction on the wall while the whole string slides, N m."""
+        return sum(length * torque for length, torque in self.wall_torques)
 
     @functools.cached_property
     def torsion(self) -> Line:

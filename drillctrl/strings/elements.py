@@ -133,11 +133,14 @@ class Reduced(NamedTuple):
         absorber's.
     top_force : array, (3 + modes,)
         Force in the uppermost element per coordinate, positive where the top end is ahead.
+    height : array, (N,)
+        Of every node above the bit, m.
     """
 
     matrices: Matrices
     shapes: FloatArray
     top_force: FloatArray
+    height: FloatArray
 
 
 class Modes(NamedTuple):
@@ -217,7 +220,8 @@ def reduced(chain: Chain, modes: Modes, count: int) -> Reduced:
     changed = [change.T @ _cleaned(part) @ change for part in projected]
     matrices = _with_absorber([0.5 * (part + part.T) for part in changed], amount)
     force = -chain.beside[2, -1] * (shapes[-1] - shapes[-2])
-    return Reduced(matrices, np.insert(shapes, -1, 0.0, axis=1), np.insert(force, -1, 0.0))
+    whole = np.insert(shapes, -1, 0.0, axis=1)
+    return Reduced(matrices, whole, np.insert(force, -1, 0.0), chain.height)
 
 
 def _cleaned(matrix: FloatArray) -> FloatArray:

@@ -24,6 +24,7 @@ from drillctrl.strings.presets import PRESETS as STRING_PRESETS
 from drillctrl.strings.presets import string_preset
 from drillctrl.strings.rig import StringRig, WeightControl, string_rig
 from drillctrl.strings.section import KINDS, MATERIALS, Section, ToolJoint
+from drillctrl.strings.wall import Wall
 
 # What a fit to a recording knows of its rig, beside the rig itself.
 FIT = "fit"
@@ -90,6 +91,9 @@ COLUMNS: dict[str, Dimension | None] = {
     "youngs_modulus": units.STRESS,
     "shear_modulus": units.STRESS,
     "density": units.DENSITY,
+    "friction_factor": units.NUMBER,
+    "inclination": units.ANGLE,
+    "side_force": units.SIDE_FORCE,
 }
 # As tallies are headed.
 _ALSO = {
@@ -297,7 +301,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
         With a header of ``name``, ``type`` or ``pipe`` (a name of `pipe_names`), ``length`` or
         ``joints`` (and ``joint length``), ``outer diameter`` or ``OD``, ``inner diameter`` or
         ``ID``, ``tool joint OD``, ``tool joint ID``, ``tool joint length``, ``weight`` (per
-        metre), ``material``, ``youngs modulus``, ``shear modulus``, ``density``, in any order.
+        metre), ``material``, ``youngs modulus``, ``shear modulus``, ``density``, and for friction
+        on the wall ``friction factor`` with ``inclination`` or ``side force``, in any order.
         A unit stands behind a value, or behind the column's name: ``OD [in]``.
 
     Raises
@@ -392,6 +397,7 @@ def _section(row: Mapping[str, Any], where: str) -> Section:
             joints,
             value.get("weight"),
             replace(MATERIALS[material], **own),
+            _wall(value, where),
         )
 
 
@@ -402,6 +408,22 @@ def _written(row: Mapping[str, Any], name: str) -> dict[str, tuple[str, object]]
     names |= {f"{short[key]} of tool joint": f"tool_joint_{key}" for key in short}
     names |= {f"tool joint length{of}": "tool_joint_length" for of in ("", f" of {name}")}
     return {said: (key, row[key]) for said, key in names.items() if key in row}
+
+
+def _wall(value: Mapping[str, Any], where: str) -> Wall | None:
+    names = ("friction_factor", "inclination", "side_force")
+    given = {name: value[name] for name in names if name in value}
+    if not given:
+        return None
+    if "friction_factor" not in given:
+        raise InputError(
+            f"friction_factor in {where}", "(missing)", f"given beside {next(iter(given))}"
+        )
+    if not {"inclination", "side_force"} & set(given):
+        wanted = "given beside friction_factor"
+        raise InputError(f"inclination or side_force in {where}", "(missing)", wanted)
+    with blamed_on(where, {name.replace("_", " "): (name, value[name]) for name in given}):
+        return Wall(**given)
 
 
 def _tool_joint(value: Mapping[str, Any], where: str) -> ToolJoint | None:

@@ -12,10 +12,11 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import checked_number
 from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.drilling.coefficients import Coefficients, Expression
-from drillctrl.drilling.string import String, StringModel
+from drillctrl.drilling.string import SideFriction, String, StringModel
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.elements import Reduced, resolved
 from drillctrl.strings.lump import lumped
+from drillctrl.strings.wall import wall_parts
 
 # Hz, up to which strings are right, for cutting ties torsion to what it excites axially; and the
 # number of modes that are right in any case: what cutting excites is counted in modes.
@@ -108,6 +109,9 @@ class PipeString(StringModel):
             tolerance=tolerance,
             units=string if units is None else units,
         )
+        if string.wall_torque > 0.0:
+            # So plants that differ by it differ in words, too.
+            self.__dict__["walls"] = tuple(section.wall for section in string.sections)
 
     @property
     def form(self) -> Any:
@@ -146,7 +150,20 @@ class PipeString(StringModel):
         outputs = {"pipe_torque": ("torque", _weights(_names("theta", torsion), weights))}
         reference = {name: None for name in names if name[-1].isdigit()}
         mass, damping, stiffness = matrices
-        return String(coordinates, mass, damping, stiffness, outputs=outputs, reference=reference)
+        return String(
+            coordinates, mass, damping, stiffness, outputs=outputs, reference=reference,
+            sides=self._sides(torsion, c.torsional_stiffness / torsional.stiffness),
+        )  # fmt: skip
+
+    def _sides(self, torsion: Reduced, unit: Expression) -> tuple[SideFriction, ...]:
+        """Return the friction on the wall."""
+        if self.string.wall_torque == 0.0:
+            return ()
+        names = _names("theta", torsion)
+        return tuple(
+            SideFriction(_weights(names, shares), torque * unit)
+            for shares, torque in wall_parts(torsion, [*self.string.wall_torques][::-1])
+        )
 
 
 def _names(name: str, line: Reduced) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def _string_rig(rig: StringRig) -> dict[str, Any]:
         "hoisting": _hoisting(rig),
     }
     parts = {name: _texts(part, PARTS[name]) for name, part in values.items() if part}
-    return {**parts, "sections": [_texts(_section(one), COLUMNS) for one in string.sections]}
+    return {**parts, "sections": [section_texts(one) for one in string.sections]}
 
 
 def _drive(machine: DriveMachine | None) -> dict[str, Any]:
@@ -92,7 +93,8 @@ def _hoisting(rig: StringRig) -> dict[str, Any]:
     return {} if ropes is None else {"stiffness": ropes}
 
 
-def _section(section: Section) -> dict[str, Any]:
+def section_texts(section: Section) -> dict[str, Any]:
+    """Return a section by the keys of `load_rig`, as a file holds them."""
     joint, material = section.tool_joint, section.material
     values: dict[str, Any] = {
         "name": section.name,
@@ -110,7 +112,12 @@ def _section(section: Section) -> dict[str, Any]:
         values["tool_joint_outer_diameter"] = joint.outer_diameter
         values["tool_joint_inner_diameter"] = joint.inner_diameter
         values["tool_joint_length"] = joint.length
-    return {name: value for name, value in values.items() if value is not None}
+    if section.wall is not None:
+        values |= asdict(section.wall)
+        if section.wall.side_force is not None:
+            del values["inclination"]
+    known = {name: value for name, value in values.items() if value is not None}
+    return _texts(known, COLUMNS)
 
 
 def _texts(values: Mapping[str, Any], kinds: Mapping[str, Dimension | None]) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.strings.line import Piece, Stretch
+from drillctrl.strings.wall import Wall
 
 KINDS = ("pipe", "heavy-weight", "collar")
 JOINT_LENGTH = 9.6
@@ -86,6 +87,8 @@ class Section:
         Mass per metre with all that belongs to it, kg/m; by default from the geometry.
     material : Material
         Of body and tool joint.
+    wall : Wall or None
+        How it lies against the wall; None where it does not rub.
 
     Raises
     ------
@@ -102,6 +105,7 @@ class Section:
     joints: int = 1
     weight: float | None = None
     material: Material = MATERIALS["steel"]
+    wall: Wall | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -133,6 +137,12 @@ class Section:
     def mass_per_metre(self) -> float:
         """Mass per metre in air, kg/m."""
         return self.geometric_weight if self.weight is None else self.weight
+
+    @property
+    def widest(self) -> float:
+        """Largest outer diameter, m."""
+        joint = self.tool_joint
+        return max(self.outer_diameter, 0.0 if joint is None else joint.outer_diameter)
 
     def torsional(self, damping: float, retardation: float) -> Stretch:
         """Return the section in torsion.

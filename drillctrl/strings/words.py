@@ -17,7 +17,9 @@ def rig_summary(found: RigCheck, language: Language = SI) -> str:
     """Return what is understood of a rig, for people, in 80 columns."""
     rig, say = found.rig, language.text
     lumped = lump(rig)
-    lines: list[tuple[str, str]] = []
+    slowest = found.torsional[0].frequency
+    told = f"with its top end held the bit swings at {slowest:.3g} Hz, once in {1 / slowest:.3g} s"
+    lines: list[tuple[str, str]] = [("Rig", told)]
     if isinstance(rig, StringRig):
         string, damping = rig.string, rig.string.damping
         assert found.weight_in_air is not None
@@ -32,6 +34,9 @@ def rig_summary(found: RigCheck, language: Language = SI) -> str:
             ("Damping", f"torsional {damping.torsional:g} 1/s, axial {damping.axial:g} 1/s,"
              f" Kelvin-Voigt {1e3 * damping.retardation:g} ms"),
         ]  # fmt: skip
+        if string.wall_torque:
+            told = f"{say('torque', string.wall_torque)} on the wall while all of it slides"
+            lines.append(("Friction", told))
         for i, section in enumerate(string.sections):
             lines.append(("Sections" if not i else "", _section_text(section, language)))
     lines += [
@@ -51,6 +56,17 @@ def rig_summary(found: RigCheck, language: Language = SI) -> str:
         lines += _mode_lines(kind, modes)
     width = max(len(label) for label, _ in lines) + 2
     return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+
+
+def wall_note(rig: Rig) -> str | None:
+    """Return what has to be said of friction on the wall; None where there is none."""
+    torque = rig.string.wall_torque if isinstance(rig, StringRig) else 0.0
+    if torque == 0.0:
+        return None
+    return (
+        f"friction on the wall, {1e-3 * torque:.3g} kN*m, acts in nonlinear runs alone;"
+        " in small motion the whole string slides, and it is constant"
+    )
 
 
 def _mass(value: float, language: Language) -> str:

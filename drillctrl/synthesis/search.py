@@ -14,11 +14,14 @@ from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
 from drillctrl.synthesis.spread import spread_points
+from drillctrl.synthesis.tracking import abscissa_along
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
 # How often a descent may be taken up again where sharpening led away from its end.
 _DESCENTS = 4
+# Plants of so many states are looked at by a collocation of this degree before descents begin.
+_MANY_STATES, _COARSE = 40, 16
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[Float
         evaluations += 2 * effort.looked
     ends = []
     for start in starts:
-        end = bfgs(family.abscissa, start, lower, upper, most=effort.steps)
+        end = bfgs(abscissa_along(family), start, lower, upper, most=effort.steps)
         evaluations += end.evaluations
         ends.append(Basin(end.gains, end.value, ()))
     ends.sort(key=lambda basin: basin.value)
@@ -189,7 +192,10 @@ def starting_points(
     # The box is generous: many useful gains are small against it.
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
     inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
-    values = family.abscissas(points)
+    # Which are the best shows at a coarse collocation, too.
+    many = family.system.order >= _MANY_STATES and family.degree > 2 * _COARSE
+    coarse = loop_family(family.system, family.feedback, _COARSE) if many else family
+    values = coarse.abscissas(points)
     order = np.argsort(values, kind="stable")
     chosen = points[order[: effort.begun]]
     if placed:
@@ -208,7 +214,7 @@ def _settle(family: LoopFamily, basin: Basin, effort: Effort) -> tuple[Basin, in
         if best.roots or best.value > before - 1e-4 * (1.0 + abs(before)):
             break
         before = best.value
-        end = bfgs(family.abscissa, best.gains, lower, upper, most=effort.steps)
+        end = bfgs(abscissa_along(family), best.gains, lower, upper, most=effort.steps)
         again, more = improve(family, Basin(end.gains, end.value, ()), effort.rounds)
         used += end.evaluations + more
         best = min(best, again, key=lambda basin: basin.value)

@@ -13,7 +13,7 @@ from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.friction import Stribeck
 from drillctrl.drilling.gain_units import gain_units
 from drillctrl.drilling.linear import linear_arrays, rhs_function
-from drillctrl.drilling.motion import rest_state
+from drillctrl.drilling.motion import rest_states
 from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
@@ -166,12 +166,14 @@ def test_a_bit_at_rest_hangs_on_the_string():
     """K q = what the load had borne, and what damping had: nothing accelerates."""
     case = as_case(OperatingPoint(10, 1.75, 14, kappa=0.1), PLANTS["collar"])
     arrays = case.motion()
-    rest = rest_state(arrays)
+    rest, after = rest_states(arrays, case.plant.state_names)
+    assert (rest == after).all()
     assert rest[1::2].tolist() == [-17.5, -10.0, -10.0]
     rates = arrays.A @ rest - arrays.E @ arrays.steady
     assert np.abs(rates[1::2]).max() < 1e-10
+    driven = as_case(case.point, PLANTS["drive"])
     with pytest.raises(InputError, match="nothing holds the string at its top"):
-        rest_state(as_case(case.point, PLANTS["drive"]).motion())
+        rest_states(driven.motion(), driven.plant.state_names)
 
 
 def test_gain_units_come_from_what_signals_measure():

@@ -377,3 +377,34 @@ def test_a_driven_string_shows_what_its_drive_returns(page):
     page.keyboard.press("Shift+ArrowRight")
     shows(page, "reflection", "stiff,")
     assert page.is_hidden("#panel-nyquist")
+    # What is sketched while the hand moves is certified when it rests.
+    type_in(page, "#speed", "110")
+    says(page, "roots", "being checked")
+    until(page, "!document.querySelector('#verdict').textContent.includes('being checked')")
+    shows(page, "roots", "110 rpm")
+
+
+def test_a_window_changes_its_units_and_stays_where_it_is(window):
+    page = window()
+    page.select_option("#structure", "pd")
+    type_in(page, "#gain-K1_1", "-3000")
+    shows(page, "roots", "-3000 N*m/rad")
+    settled(page)
+    verdict = page.inner_text("#verdict")
+    page.select_option("#units", "field")
+    shows(page, "roots", "65.6168 ft/h")
+    shows(page, "chart", "--units field")
+    settled(page)
+    assert page.inner_text("#verdict") == verdict
+    assert float(page.input_value("#gain-K1_1")) == pytest.approx(-3000 * 0.737562, rel=1e-5)
+    assert "rate of penetration [ft/h]" in page.text_content("#panel-chart svg")
+    assert "klbf" in page.text_content("#panel-motion .picture")
+    labels = page.inner_text("#controls")
+    assert "Rate of penetration, ft/h" in labels
+    assert "m/h" not in labels.replace("m/h, kN, N·m, MPa", "")
+    with page.expect_download() as saved:
+        page.locator("#panel-chart button", has_text="Download data").click()
+    assert "rop in ft/h" in saved.value.path().read_text().splitlines()[0]
+    page.select_option("#units", "si")
+    shows(page, "roots", "--rop '20 m/h'")
+    assert float(page.input_value("#gain-K1_1")) == pytest.approx(-3000, rel=1e-5)

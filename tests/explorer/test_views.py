@@ -43,7 +43,17 @@ CASE2 = {
     "K2": K2,
 }
 FREE = {**CASE2, "structure": None}
-DRIVEN = {**FREE, "rig": {"name": "vertical-3000", "text": None}, "structure": "soft-torque"}
+DRIVEN_RIG = {"rig": {"name": "vertical-3000", "text": None}}
+DRIVEN = {**FREE, **DRIVEN_RIG, "structure": "soft-torque"}
+FOOT, POUND = 0.3048, 0.45359237 * 9.80665
+FIELD = {
+    **CASE2,
+    "units": "field",
+    "rop": 20 / FOOT,
+    "rock_strength": 60e6 * 0.0254**2 / POUND / 1e3,
+    "K1": [gain / FOOT / POUND for gain in K1],
+    "K2": [gain / FOOT / POUND for gain in K2],
+}
 GROUPS = {"rig": None, "omega0": 10.0, "delta0": 1.75, "psi": 14.0, "structure": None}
 GAINS = ("case2", np.array(K1) / SCALE, np.array(K2) / SCALE)
 
@@ -91,6 +101,49 @@ def test_a_stable_point_says_how_fast_vibrations_die_away():
     found, _ = ask("roots", {**FREE, "speed": 200})
     assert found["stable"] is True
     assert found["sentence"].startswith("Stable: a vibration at ")
+
+
+def test_a_window_of_field_units_is_told_the_same_in_them(capsys):
+    found, plain = ask("roots", FIELD)[0], ask("roots", CASE2)[0]
+    assert found["rightmost"] == pytest.approx(plain["rightmost"], rel=1e-9)
+    for unit in ("ft/h", "ksi", "ft*lbf/rad", "--units field"):
+        assert unit in found["command"]
+    alpha = found["data"]["spectral_abscissa"]
+    assert printed(found["command"], capsys)["spectral_abscissa"] == pytest.approx(alpha, rel=1e-9)
+    ran = run(found["python"])["result"]
+    assert ran.spectral_abscissa == pytest.approx(alpha, rel=1e-9)
+    assert "ft/h" in ran.summary()
+    found, _ = ask("motion", FIELD, duration=5, start="small")
+    plain, _ = ask("motion", CASE2, duration=5, start="small")
+    units = [column["unit"] for column in found["columns"]]
+    assert units == ["s", "rpm", "ft/h", "klbf", "kft·lbf", "kft·lbf"]
+    for column, other, factor in zip(
+        found["columns"][1:4],
+        plain["columns"][1:4],
+        (1.0, 1 / FOOT, 1 / POUND),
+        strict=True,
+    ):
+        told, si = np.array(column["values"]), np.array(other["values"])
+        np.testing.assert_allclose(told, factor * si, rtol=1e-4, atol=1e-4 * np.ptp(told))
+
+
+def test_a_chart_and_a_law_in_field_units(capsys):
+    feet = [10.0 / FOOT, 30.0 / FOOT]
+    found, _ = ask("chart", FIELD, x=[100.0, 200.0], y=feet)
+    own = chart(POINT, ("speed", 100, 200), ("rop", 10, 30), *GAINS)
+    assert found["data"]["stable_area"] == pytest.approx(own.stable_area / FOOT, rel=5e-3)
+    assert "ft/h" in found["command"]
+    offered = {
+        s["name"]: s["gains"] for s in ask("describe", {**FIELD, **DRIVEN_RIG})[0]["structures"]
+    }
+    plain = {s["name"]: s["gains"] for s in ask("describe", DRIVEN)[0]["structures"]}
+    for gain, si in zip(offered["stiff"], plain["stiff"], strict=True):
+        assert gain["unit"].startswith("ft·lbf")
+        assert gain["value"] == pytest.approx(si["value"] / FOOT / POUND)
+    gains = [gain["value"] for gain in offered["soft-torque"]]
+    moved = {**FIELD, **DRIVEN_RIG, "structure": "soft-torque", "K1": gains, "K2": None}
+    law = read_asked(moved).law
+    assert law.speed.numerator[-1] == pytest.approx(-plain["soft-torque"][0]["value"])
 
 
 def test_nyquist_is_the_ratio_of_the_two_determinants():
@@ -194,6 +247,16 @@ def test_a_driven_string_is_analysed_with_its_law():
     own = analyze(as_case(point, driven_plant(rig, drive_control("soft-torque", rig))))
     assert found["data"]["spectral_abscissa"] == pytest.approx(own.spectral_abscissa, rel=1e-6)
     assert "--structure soft-torque" in found["command"]
+
+
+def test_a_sketch_of_the_roots_is_that_of_the_analysis():
+    """It comes first where analysing takes longer than a drag, and says that it is one."""
+    for state in (DRIVEN, CASE2):
+        sketch, whole = (ask("roots", state, **options)[0] for options in ({"rough": True}, {}))
+        assert sketch["rightmost"] == pytest.approx(whole["rightmost"], rel=1e-6)
+        assert sketch["sentence"] == f"{whole['sentence'][:-1]}; being checked …"
+        assert sketch["series"] == whole["series"]
+        assert "data" not in sketch
 
 
 def test_a_law_is_designed_once_for_all_points_of_a_rig():

@@ -86,6 +86,7 @@ def test_a_record_of_another_kind_is_fitted(tmp_path):
         assert factor * given == pytest.approx(1.0, abs=0.03)
         assert told.low / told.value <= 1.0 / (factor * given) <= told.high / told.value
     assert fit.damping.low < rig.damping < fit.damping.high
+    assert fit.damping.known != any("damping cannot be told closer" in why for why in fit.reasons)
     known = np.isfinite(study.bit.speed)
     true = np.interp(study.bit.time, time, bit) * np.pi / 30.0
     left = study.bit.speed[known] - true[known]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from typing import ClassVar
 
 import casadi as ca
@@ -13,6 +16,7 @@ from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.bit_rock import BitRock, Load, PaperLaw
 from drillctrl.drilling.case import as_case
+from drillctrl.drilling.friction import Stribeck
 from drillctrl.drilling.plant import paper_plant
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.drilling.string import String, spring_string
@@ -208,10 +212,23 @@ def test_at_rest_the_multipliers_are_exponentials_of_the_roots():
     assert residuals[0] < 1e-6
 
 
-def test_another_string_does_not_recompile(stick_slip):
-    march = kernel("march", stick_slip.structure.physics).march
+def test_another_string_or_law_does_not_recompile(stick_slip):
+    march = kernel("march").march
     simulate(POINT, duration=1.0)
+    simulate(as_case(POINT, paper_plant(bit=Stribeck(drop=4.0))), duration=1.0)
     assert len(march.signatures) == 1
+
+
+def test_a_run_is_looked_at_in_another_process():
+    # Machine code of the law stands at another place there.
+    run = simulate(POINT, duration=2.0)
+    script = (
+        "import pickle, sys; run = pickle.load(sys.stdin.buffer); "
+        "print(repr(float(run.at([1.5]).torque_on_bit[0])))"
+    )
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, input=pickle.dumps(run), capture_output=True, check=True)
+    assert float(done.stdout) == run.at([1.5]).torque_on_bit[0]
 
 
 def test_names_that_the_string_lacks_are_refused():

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 
 import casadi as ca
+import numba
 import numpy as np
 import pytest
 
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.linear import rhs_function
-from drillctrl.drilling.motion import law_functions
+from drillctrl.drilling.motion import kinematic_functions, load_function
 from drillctrl.drilling.point import OperatingPoint
-from drillctrl.simulation.compile import kernel
+from drillctrl.simulation.compile import kernel, law_address
 from drillctrl.simulation.kernel import data
 from drillctrl.simulation.layout import settings_for
 from drillctrl.simulation.structure import structure_of
@@ -39,10 +40,18 @@ def plain(values: list) -> list:
     return [float(v[0]) if v.size == 1 else tuple(v.tolist()) for v in values]
 
 
+def compiled_load(case):
+    """The law of a case as the kernel calls it."""
+    load, address = kernel("law").load, law_address(structure_of(case).law)
+    called = numba.njit(lambda contact, rates, law: load(contact, rates, law))
+    return lambda contact, rates, q: called(contact, rates, (address, np.array(q)))
+
+
 @pytest.mark.parametrize("index", range(4))
 def test_compiled_physics_equals_casadi(index):
-    function = law_functions(CASE.plant.bit)[index]
-    compiled = getattr(kernel("physics", structure_of(CASE).physics), function.name())
+    function = (load_function(CASE.plant.bit), *kinematic_functions())[index]
+    name = function.name()
+    compiled = compiled_load(CASE) if name == "load" else getattr(kernel("physics"), name)
     for _ in range(50):
         values = arguments(function)
         expected = function(*values).full().ravel()
@@ -95,7 +104,7 @@ def test_unknown_operation_is_refused():
 @pytest.mark.parametrize("contact", [0, 1])
 def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     string = structure_of(CASE)
-    model = kernel("model", string.physics)
+    model = kernel("model")
     p = CASE.parameter_vector
     tau = 0.2
     z_rate = 3.0 if axial == "DOWN" else -3.0
@@ -113,7 +122,7 @@ def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     alone = arrays.A @ state + arrays.B @ [0.1, 0.2]
     load = model.bit_load(
         alone[1], alone[3], depth, (z_rate, turn), contact, getattr(data, torsion),
-        getattr(data, axial), 0, settings.real, settings.q, np.zeros(data.P_ROOM),
+        getattr(data, axial), 0, settings.real, settings.law, np.zeros(data.P_ROOM),
     )  # fmt: skip
     found = alone + arrays.E @ (np.array(load) - arrays.steady)
     np.testing.assert_allclose(found, expected, rtol=1e-12)

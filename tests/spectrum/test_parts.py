@@ -16,6 +16,7 @@ from drillctrl import (
 )
 from drillctrl.spectrum.characteristic import perron_root
 from drillctrl.spectrum.parts import parts
+from drillctrl.spectrum.polishing import polish
 
 _PATH = Path(__file__).parents[2] / "benchmarks" / "agreement.py"
 _SPEC = importlib.util.spec_from_file_location("agreement", _PATH)
@@ -66,11 +67,20 @@ def test_states_that_no_delayed_signal_reaches():
 # (s − a)^k by hand.
 @pytest.mark.parametrize(
     ("seed", "multiplicity"),
-    [(31000191, 3), (31001507, None), (32000070, 3), (33000230, 5)],
+    [
+        (31000191, 3),
+        (31001507, None),
+        (32000070, 3),
+        (33000230, 5),
+        (40005305, 6),
+        (40010470, 8),
+        (41007292, 7),
+        (41007599, 2),
+    ],
 )
 def test_delays_that_do_not_show_in_the_characteristic_function(seed, multiplicity):
     system = agreement.random_system(seed)
-    expected = 0.0 if seed == 31000191 else float(system.A0[0, 0])
+    expected = float(system.A0.diagonal().max()) if seed != 31000191 else 0.0
     assert spectral_abscissa(system) == pytest.approx(expected, rel=1e-9, abs=1e-6)
     assert agreement.verdict(system, 1.0) == ("agrees", "")
     if multiplicity is not None:
@@ -98,3 +108,14 @@ def test_bound_of_numbers_far_apart(size):
     """Of a triangular matrix it is the largest diagonal entry, however large the others."""
     matrix = np.diag([3e5, 2e5, 1e5]) + size * np.eye(3, k=-1)
     assert perron_root(matrix) == pytest.approx(3e5, rel=1e-9)
+
+
+def test_a_part_with_no_root_near_the_line():
+    """It has places to start from further left only: nothing is polished, nothing found."""
+    a0, late = np.diag([-1.0, -40.0]), np.diag([0.5, 0.1])
+    for part, many in zip(parts(DelaySystem(a0, (late,), (1.0,))), (1, 0), strict=True):
+        roots, done = polish(part, np.full(many, ALONE + 0j))
+        assert roots.size == done.size == many
+        assert [root.real for root in characteristic_roots(part, -1.0)] == (
+            pytest.approx([ALONE] * many, abs=1e-12)
+        )

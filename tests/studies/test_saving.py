@@ -21,22 +21,28 @@ from drillctrl import (
     campaign,
     chart,
     compare,
+    compare_drives,
     design,
     dimensionless_grid,
+    example_path,
     linear_axis,
     load_result,
+    load_rig,
     paper_plant,
+    read_record,
     save_result,
     simulate,
     stabilisable_chart,
     stability_volume,
     string_preset,
+    study_record,
     table1,
     vibration_map,
 )
 from drillctrl.base.codec import decode, encode
-from drillctrl.studies import saved_kinds
+from drillctrl.interop import saved_kinds
 
+from ..records.test_fitted_rig import fit_of
 from ..strangers import VelocityWeakening
 
 RIG = RigPoint(table1(), rotary_speed=5.0 * math.pi, penetration_rate=20.0 / 3600.0)
@@ -146,7 +152,7 @@ def test_what_cannot_be_kept_is_refused(run, tmp_path):
 
 def _sealed(document):
     """The document with the checksum that belongs to it: whoever forges one can make it."""
-    from drillctrl.studies.saving import _checksum
+    from drillctrl.interop.saving import _checksum
 
     return {**document, "checksum": _checksum(document["result"])}
 
@@ -249,7 +255,16 @@ def test_numbers_of_every_kind_survive():
         decode({"is": "Some", "value": 1}, {})
 
 
+def _study():
+    """A minute and a half of the recording that ships, its string carried down, and a fit."""
+    rig = load_rig(example_path("rig"))
+    shipped = read_record(example_path("record")).part(0.0, 100.0)
+    return dataclasses.replace(study_record(shipped, rig, fit=False), fit=fit_of(rig))
+
+
 RESULTS = {
+    "record": _study,
+    "drives": lambda: compare_drives(string_preset("vertical-3000"), ("stiff", "soft-torque")),
     "chart": lambda: chart(RIG, ("speed", 60, 180), ("rop", 5, 40)),
     "stabilisable": lambda: stabilisable_chart(
         POINT, ("omega0", 9, 12), ("delta0", 0, 4), "p", first_lines=3, tolerance=0.1

@@ -1,7 +1,7 @@
 "use strict";
 // The window's own state: nothing of it is kept by the server, and no other window sees it.
 
-const state = { rig: null, structure: null, speed: 120, rop: 20, rock_strength: null,
+const state = { rig: null, units: "si", structure: null, speed: 120, rop: 20, rock_strength: null,
   omega0: 10, delta0: 1.75, psi: 14, eta: 1.6, xi: 0.02, kappa: 0.02 };
 const opened = new Map();          // rigs that this window opened, by name
 const moved = new Map();           // gains that were moved, by rig and structure
@@ -14,10 +14,17 @@ const byId = id => document.getElementById(id);
 const onRig = () => state.rig !== null;
 const names = () => onRig() ? ["speed", "rop"] : ["omega0", "delta0"];
 const structure = () => known.structures.find(s => s.name === state.structure) || known.structures[0];
-const gainKey = () => JSON.stringify([state.rig, state.structure]);
+const gainKey = () => JSON.stringify([state.rig, state.units, state.structure]);
+// Quantities in the units of this window: [unit, how many are one SI unit].
+const unitOf = quantity => known.units[quantity][0];
+const inUnits = (quantity, value) => value * known.units[quantity][1];
+const tellIn = (quantity, value) => value === null ? "–" : `${short(inUnits(quantity, value))} ${unitOf(quantity)}`;
+// As the files of `map` name their columns.
+const columnNames = () => onRig() ? ["speed in rpm", `rop in ${unitOf("axial_rate")}`] : names();
+const isField = () => onRig() && state.units === "field";
 
 function question(without) {
-  const asked = { rig: state.rig };
+  const asked = { rig: state.rig, units: state.units };
   for (const name of onRig() ? ["speed", "rop", "rock_strength"] : ["omega0", "delta0", "psi", "eta", "xi", "kappa"])
     asked[name] = state[name];
   asked.structure = without ? null : state.structure;
@@ -63,13 +70,14 @@ function slider(id, text, low, high, step, value, changed) {
 }
 
 const sliders = {};
+const short3 = value => Number(value.toPrecision(3));
 function buildPoint() {
   const at = byId("point");
   at.replaceChildren();
   const [xs, ys] = [axes.x, axes.y];
   const wanted = onRig()
-    ? [["speed", "Rotary speed, rpm", Math.max(1, xs[0]), xs[1], 0.5], ["rop", "Rate of penetration, m/h", ys[0], ys[1], 0.1],
-      ["rock_strength", "Rock strength, MPa", 1, 300, 1]]
+    ? [["speed", "Rotary speed, rpm", Math.max(1, xs[0]), xs[1], 0.5], ["rop", `Rate of penetration, ${unitOf("axial_rate")}`, ys[0], ys[1], isField() ? 0.5 : 0.1],
+      ["rock_strength", `Rock strength, ${unitOf("stress")}`, short3(inUnits("stress", 1e6)), short3(inUnits("stress", 300e6)), isField() ? 0.1 : 1]]
     : [["omega0", "Rotary speed ω₀", Math.max(0.1, xs[0]), xs[1], 0.05], ["delta0", "Depth of cut δ₀", ys[0], ys[1], 0.01], ["psi", "Cutting coefficient ψ", 0.1, 40, 0.1]];
   for (const [name, text, low, high, step] of wanted) {
     const value = state[name] === null ? known.rock_strength : state[name];
@@ -160,6 +168,8 @@ async function chooseRig(rig) {
   started = true;
   byId("notes").replaceChildren(...known.notes.map(note => element("li", {}, note)));
   buildRigs();
+  byId("units-of-rig").hidden = !onRig();
+  byId("units").value = state.units;
   buildStructures();
   buildPoint();
   buildAxes();
@@ -171,7 +181,7 @@ async function chooseRig(rig) {
 
 function usualAxes() {
   return onRig()
-    ? { x: [30, Math.max(240, 1.5 * state.speed)], y: [0, Math.max(50, 1.5 * state.rop)] }
+    ? { x: [30, Math.max(240, 1.5 * state.speed)], y: [0, Math.max(isField() ? 160 : 50, 1.5 * state.rop)] }
     : { x: [0.5, Math.max(25, 1.5 * state.omega0)], y: [0, Math.max(15, 1.5 * state.delta0)] };
 }
 
@@ -195,6 +205,36 @@ function showLine(line) {
   area.setSelectionRange(from, from + (lines[line - 1] || "").length);
 }
 
+// All numbers of the window in other units; what they say stays the same.
+byId("units").addEventListener("change", async event => {
+  const before = known, units = event.target.value;
+  let found;
+  const rate = before.units.axial_rate[1], stress = before.units.stress[1];
+  try { found = await ask("describe", { rig: state.rig, units }, {}); } catch (error) {
+    byId("verdict").textContent = told(error);
+    event.target.value = state.units;
+    return;
+  }
+  const round6 = v => Number(v.toPrecision(6)), turn = found.units.axial_rate[1] / rate;
+  for (const structure of before.structures) {
+    const [old, own] = [state.units, units].map(u => JSON.stringify([state.rig, u, structure.name])), set = moved.get(old);
+    const ratios = structure.gains.map((g, k) => found.structures.find(s => s.name === structure.name).gains[k].per / g.per);
+    if (set) moved.set(own, { touched: set.touched, values: set.values.map((v, k) => round6(v * ratios[k])), bounds: set.bounds.map((b, k) => b.map(v => round6(v * ratios[k]))) });
+  }
+  known = { ...found, notes: before.notes };
+  state.units = units;
+  state.rop = round6(state.rop * turn);
+  axes.y = axes.y.map(v => Number((v * turn).toPrecision(4)));
+  if (state.rock_strength !== null) state.rock_strength = round6(state.rock_strength * found.units.stress[1] / stress);
+  for (const one of Object.values(follow)) one.renew();
+  for (const job of [runMotion, runMap, runStrings, runFind]) if (job.stop) job.stop.abort();
+  chartPlot = chartHeld = null;
+  buildStructures();
+  buildPoint();
+  buildAxes();
+  for (const panel of [panels.map, panels.strings]) panel.clear("");
+  changedLoop();
+});
 byId("rig").addEventListener("change", event => {
   const name = event.target.value;
   chooseRig(name === "" ? null : { name, text: opened.has(name) ? opened.get(name) : null })
@@ -249,9 +289,9 @@ function buildAxes() {
   }
 }
 const axisLabels = () => onRig()
-  ? { x: { label: "rotary speed", unit: "rpm" }, y: { label: "rate of penetration", unit: "m/h" } }
+  ? { x: { label: "rotary speed", unit: "rpm" }, y: { label: "rate of penetration", unit: unitOf("axial_rate") } }
   : { x: { label: "rotary speed ω₀", unit: "" }, y: { label: "nominal depth of cut δ₀", unit: "" } };
-const pointText = () => onRig() ? `${short(state.speed)} rpm, ${short(state.rop)} m/h` : `ω₀ ${short(state.omega0)}, δ₀ ${short(state.delta0)}`;
+const pointText = () => onRig() ? `${short(state.speed)} rpm, ${short(state.rop)} ${unitOf("axial_rate")}` : `ω₀ ${short(state.omega0)}, δ₀ ${short(state.delta0)}`;
 
 panels.chart = new Panel("chart", "Where drilling is stable: drag the circle", chartAxes());
 let chartHeld = null;
@@ -273,7 +313,7 @@ function drawChart(result) {
     areas: [{ name: "stable", polygons: result.strips, colour: COLOURS[0] }], series,
     handle: {
       x: state[nx], y: state[ny], label: "Operating point: arrow keys move it", text: pointText(),
-      stepX: onRig() ? 1 : 0.1, stepY: onRig() ? 0.5 : 0.05,
+      stepX: onRig() ? 1 : 0.1, stepY: isField() ? 1 : onRig() ? 0.5 : 0.05,
       moved(x, y) {
         state[nx] = Math.max(Number(x.toFixed(onRig() ? 1 : 2)), onRig() ? 1 : 0.1);
         state[ny] = Number(y.toFixed(onRig() ? 1 : 2));
@@ -290,8 +330,8 @@ function drawChart(result) {
   const share = result.data.stable_area / ((axes.x[1] - axes.x[0]) * (axes.y[1] - axes.y[0]));
   panels.chart.tell(`Smooth drilling is stable on ${(100 * share).toFixed(0)} % of this chart.`);
   panels.chart.show(result, {
-    curve: result.curves.flatMap((c, k) => c.map(() => k + 1)), [nx]: result.curves.flatMap(c => c.map(p => p[0])),
-    [ny]: result.curves.flatMap(c => c.map(p => p[1])),
+    curve: result.curves.flatMap((c, k) => c.map(() => k + 1)), [columnNames()[0]]: result.curves.flatMap(c => c.map(p => p[0])),
+    [columnNames()[1]]: result.curves.flatMap(c => c.map(p => p[1])),
   });
 }
 
@@ -308,6 +348,7 @@ function drawRoots(result) {
       return { name: s.name, x: s.x, y: s.y, points: last ? "x" : "o", colour: last ? COLOURS[0] : COLOURS[4] };
     }),
   });
+  if (result.rough) checkSoon();
   panels.roots.tell(result.sentence);
   const verdict = byId("verdict");
   if (verdict.textContent !== result.sentence) verdict.textContent = result.sentence;
@@ -403,7 +444,7 @@ function drawMap(result) {
   });
   const bad = result.outcomes.filter(o => o !== "settles" && o !== "orbit").length;
   panels.map.tell(`At ${bad} of ${result.outcomes.length} points the bit sticks, bounces, falls behind or worse.`);
-  panels.map.show(result, columnsOf({ name: names()[0], values: result.points.map(p => p[0]) }, { name: names()[1], values: result.points.map(p => p[1]) }, { outcome: result.outcomes, swing: result.swing }));
+  panels.map.show(result, columnsOf({ name: columnNames()[0], values: result.points.map(p => p[0]) }, { name: columnNames()[1], values: result.points.map(p => p[1]) }, { outcome: result.outcomes, swing: result.swing }));
 }
 const runMap = new Job(panels.map, "map", mapJob.go, mapJob.cancel, mapJob.bar);
 // Points lie in the middle of cells that cover the chart.
@@ -429,11 +470,10 @@ function buildRigList() {
 function drawStrings(result) {
   const rows = result.rows;
   const first = modes => modes.length ? `${short(modes[0].frequency)} Hz` : "–";
-  const kilo = (value, unit) => value === null ? "–" : `${short(value / 1000)} ${unit}`;
   const columns = {
-    rig: rows.map(r => r.name), controller: rows.map(r => r.controller), length: rows.map(r => r.length === null ? "–" : `${short(r.length)} m`),
-    "buoyed weight": rows.map(r => kilo(r.buoyed_weight, "kN")), "first torsion": rows.map(r => first(r.modes.torsional)),
-    "first axial": rows.map(r => first(r.modes.axial)), "pipe impedance": rows.map(r => r.impedance === null ? "–" : `${short(r.impedance)} N·m·s`),
+    rig: rows.map(r => r.name), controller: rows.map(r => r.controller), length: rows.map(r => tellIn("depth", r.length)),
+    "buoyed weight": rows.map(r => tellIn("force", r.buoyed_weight)), "first torsion": rows.map(r => first(r.modes.torsional)),
+    "first axial": rows.map(r => first(r.modes.axial)), "pipe impedance": rows.map(r => tellIn("impedance", r.impedance)),
   };
   const heads = Object.keys(columns);
   const table = element("table", {}, element("thead", {}, element("tr", {}, ...heads.map(h => element("th", { scope: "col" }, h)))),
@@ -461,24 +501,25 @@ function drawnStrings(rows) {
   const box = element("div", {});
   if (!drawn.length) return box;
   const height = 300, svg = make("svg", { viewBox: `0 0 ${WIDTH} ${height}`, xmlns: SVG, "font-size": 13, "font-family": "system-ui, 'DejaVu Sans', sans-serif", role: "img",
-    "aria-label": `Strings to scale: ${drawn.map(r => `${r.name}, ${short(r.length)} m`).join("; ")}` }, box);
+    "aria-label": `Strings to scale: ${drawn.map(r => `${r.name}, ${tellIn("depth", r.length)}`).join("; ")}` }, box);
   make("rect", { width: WIDTH, height, fill: "#ffffff" }, svg);
-  const longest = Math.max(...drawn.map(r => r.length)), widest = Math.max(...drawn.flatMap(r => r.sections.map(s => s.outer_diameter)));
+  const longest = inUnits("depth", Math.max(...drawn.map(r => r.length))), widest = Math.max(...drawn.flatMap(r => r.sections.map(s => s.outer_diameter)));
   const y = v => 22 + (height - 50) * v / longest, room = (WIDTH - LEFT) / drawn.length;
   const depth = { min: 0, max: longest };
   for (const value of ticks(depth, 6)) {
     make("text", { x: LEFT - 8, y: y(value) + 4.5, "text-anchor": "end" }, svg, short(value));
     make("line", { x1: LEFT - 5, x2: LEFT, y1: y(value), y2: y(value), stroke: "#1a1a1a" }, svg);
   }
-  make("text", { transform: `translate(14 ${height / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, "depth [m]");
+  make("text", { x: 4, y: 14 }, svg, `depth [${unitOf("depth")}]`);
   drawn.forEach((row, k) => {
     const middle = LEFT + room * (k + 0.5);
     let top = 0;
     for (const section of row.sections) {
       const w = 40 * section.outer_diameter / widest;
-      const bar = make("rect", { x: middle - w / 2, y: y(top), width: w, height: Math.max(1, y(top + section.length) - y(top)), fill: { pipe: "#b9cbe0", "heavy-weight": "#7f9fc6", collar: "#3d5f8a" }[section.kind] || "#999999", stroke: "#1a1a1a", "stroke-width": 0.6 }, svg);
-      make("title", {}, bar, `${section.name}: ${short(section.length)} m, OD ${short(1000 * section.outer_diameter)} mm`);
-      top += section.length;
+      const reach = inUnits("depth", section.length);
+      const bar = make("rect", { x: middle - w / 2, y: y(top), width: w, height: Math.max(1, y(top + reach) - y(top)), fill: { pipe: "#b9cbe0", "heavy-weight": "#7f9fc6", collar: "#3d5f8a" }[section.kind] || "#999999", stroke: "#1a1a1a", "stroke-width": 0.6 }, svg);
+      make("title", {}, bar, `${section.name}: ${tellIn("depth", section.length)}, OD ${tellIn("length", section.outer_diameter)}`);
+      top += reach;
     }
     make("text", { x: middle, y: 14, "text-anchor": "middle" }, svg, row.name);
   });
@@ -489,7 +530,7 @@ const runStrings = new Job(panels.strings, "strings", stringsJob.go, stringsJob.
 stringsJob.go.addEventListener("click", () => {
   const rigs = [...rigList.querySelectorAll("input:checked")].map(i => ({ name: i.value, text: opened.has(i.value) ? opened.get(i.value) : null }));
   if (!rigs.length) { panels.strings.tell("Choose at least one rig.", true); return; }
-  if (withBoundary.checked && !onRig()) { panels.strings.tell("Choose a rig above first: charts of strings are over rpm and m/h.", true); return; }
+  if (withBoundary.checked && !onRig()) { panels.strings.tell("Choose a rig above first: charts of strings are over speed and rate of penetration.", true); return; }
   runStrings.run({ ...axes, rigs, boundary: withBoundary.checked }, drawStrings);
 });
 
@@ -511,7 +552,11 @@ byId("find").addEventListener("click", () => {
 // ---------------------------------------------------------------- what follows what
 
 const follow = {
-  roots: new Follower(panels.roots, "roots", () => ({}), drawRoots),
+  // Analysing a string of pipe takes longer than a drag: its roots are sketched first.
+  roots: new Follower(panels.roots, "roots", () => ({ rough: !known.lumped }), drawRoots),
+  checked: new Follower(panels.roots, "roots", () => { checkedOf = lastPoint; return {}; }, result => {
+    if (checkedOf === lastPoint) drawRoots(result);
+  }),
   nyquist: new Follower(panels.nyquist, "nyquist", () => ({}), drawNyquist),
   reflection: new Follower(panels.reflection, "reflection", () => ({}), drawReflection),
   motion: new Follower(panels.motion, "motion", motionOptions, drawMotion),
@@ -523,6 +568,13 @@ const follow = {
     if (!alone && !known.drive && free === null) askFree();
   }),
 };
+// The point rests: what was sketched is sharpened, counted and certified.
+let checkedOf = "", resting = 0;
+function checkSoon() {
+  clearTimeout(resting);
+  panels.roots.busy("checking …", follow.checked);
+  resting = setTimeout(() => follow.checked.poke(), 250);
+}
 async function askFree() {
   free = false;
   const key = freeFor;
@@ -549,7 +601,7 @@ function changedPoint() {
 }
 // Rig, rock or gains: the chart is another one too.
 function changedLoop() {
-  const key = JSON.stringify([state.rig, state.rock_strength, state.psi, axes]);
+  const key = JSON.stringify([state.rig, state.units, state.rock_strength, state.psi, axes]);
   if (key !== freeFor) { free = null; freeFor = key; }
   changedPoint();
   follow.chart.poke();

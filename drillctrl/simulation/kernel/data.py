@@ -39,20 +39,22 @@ NEAR, FAR, LATE, DELAYS = 0, 1, 2, 5
 # Entries of ``Settings.whole``: sizes of the plant, switches, and from ROWS on the matrix.
 STATES, INPUTS, OUTPUTS = 0, 1, 2
 # PAST: there are gains on delayed outputs; BACKWARDS: whether a bit may turn back; FED: place of
-# the list of outputs that are fed back; PIVOT: rows whose rates others are told by, -1 for none.
+# the list of outputs that are fed back; SIDES: parts of the string that rub on the wall, without
+# the bit's; PIVOT: rows whose rates others are told by, -1 for none.
 (LINEAR, MULTIPLE, FEEDBACK, PAST, CURRENT_DELAY, SAMPLED, ACTUATOR, RATE_FEEDBACK, BACKWARDS,
- FED, PIVOT) = range(3, 14)  # fmt: skip
+ FED, SIDES, PIVOT) = range(3, 15)  # fmt: skip
 PIVOTS = 3
 ROWS = PIVOT + PIVOTS
 # Entries of ``Settings.real``. Weight and torque on bit and depth of cut in steady drilling;
-# what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1].
+# what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1]; and behind
+# the clock the friction of the bit's part of the string on the wall.
 WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
 # The controller's clock; errors allowed; constant delays of the linear model and of the
 # measured signal, 0 where there is none; bounds of x' and θ' (two each: at t = 0, and what
 # they gain by time); size of each event function, to tell zero from rounding, and that of the
 # last ones: the limits of inputs (m) and of their rates (m).
 T_ON, MEASURE_DELAY, PERIOD, LAG_TIME, RTOL, ATOL, LAGS = 5, 6, 7, 8, 9, 10, 11
-BOUNDS, SCALE = 13, 17
+BOUNDS, WALL, SCALE = 13, 17, 18
 LIMITS = SCALE + AT_LIMIT
 # Columns of `schedule`.
 SINCE, PAST_AGE = 0, 1
@@ -101,14 +103,14 @@ def motion_columns(
     return (*states, "ddx", "ddtheta", *bit, *inputs, *new, contact)
 
 
-def history_width(states: int, inputs: int) -> int:
+def history_width(states: int, inputs: int, sides: int = 0) -> int:
     """Return the number of columns of ``History.real``."""
-    return OTHERS + QUARTIC * (states + inputs - 4) + inputs
+    return OTHERS + QUARTIC * (states + inputs - 4) + inputs + sides
 
 
-def vector_length(states: int, inputs: int) -> int:
+def vector_length(states: int, inputs: int, sides: int = 0) -> int:
     """Return the length of the vector that the march moves; see `Settings`."""
-    return states + 4 * inputs + 6 + PIVOTS
+    return states + 4 * inputs + 6 + PIVOTS + sides
 
 
 class Settings(NamedTuple):
@@ -117,19 +119,20 @@ class Settings(NamedTuple):
     The motion is X' = A X + B u + T top + E (load − steady), of which X starts with x, x',
     θ, θ' of the bit, and the outputs are C X − R top. All of it acts on one vector,
 
-        y = (X, actuators, held commands, u, top, load − steady, beyond, pivots),
+        y = (X, actuators, held commands, u, top, load − steady, beyond, pivots, sides),
 
-    of length n + m + m + m + 4 + 2 + m + 3, so that A, B, T, E, C and R are the rows of one
+    of length n + m + m + m + 4 + 2 + m + 3 + k, so that A, B, T, E, C and R are the rows of one
     sparse matrix. In the linear model the bit's state a delay ago takes the place of top.
     ``beyond`` is by how much commands exceed their limits. ``pivots`` are the rates of the
-    bit's and the top's speeds: the modes of a string follow these, and share the rest.
+    bit's and the top's speeds: the modes of a string follow these, and share the rest. ``sides``
+    are what friction along the string brings beyond that of steady drilling, held over a step.
 
     Attributes
     ----------
     bit : tuple
         Ω0, V0 and n: last argument of `depth`, `turned` and `rates`.
-    q : array
-        Coefficients and the law's own parameters: last argument of `load`.
+    law : (int, array)
+        Address of the law, and the coefficients and its own parameters: last argument of `load`.
     whole : int array
         STATES, ...; LINEAR, ...; ROWS; the list of FED.
     real : array
@@ -148,10 +151,13 @@ class Settings(NamedTuple):
         Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
     noise : array, (k, f)
         Added to the k-th sample of these outputs.
+    side : array, (k, n + 2 + 2 k)
+        Of each part that rubs: speed per state, and per speed of the top end; torque; acceleration
+        by the torque of each, the bit free to turn; and the bit held.
     """
 
     bit: Any
-    q: Any
+    law: Any
     whole: Any
     real: Any
     value: Any
@@ -159,6 +165,7 @@ class Settings(NamedTuple):
     gains: Any
     drive: Any
     noise: Any
+    side: Any
 
 
 class History(NamedTuple):
@@ -169,7 +176,7 @@ class History(NamedTuple):
     real : array, (cap, `history_width`)
         START: time at which a step starts; LENGTH; X, THETA: coefficients of quintics in
         s = (t − start)/length; OTHERS: those of a quartic for each further state and then
-        each actuator; held output of a sampled controller.
+        each actuator; held output of a sampled controller; friction along the string.
     whole : int array, (cap, WHOLES)
         CONTACT, TORSION, AXIAL: mode; LEVEL: of the break at the start; LAG: step that holds
         t − τ at the start; FACE, PASSES: step that left the rock face, and how many blade

@@ -18,6 +18,7 @@ from .data import (
     AT_LIMIT,
     BACKWARDS,
     BARRIER,
+    BETWEEN,
     BOUNDS,
     COLLAPSE,
     CURRENT_DELAY,
@@ -41,6 +42,7 @@ from .data import (
     RESUME,
     REVERSE,
     REVERSED,
+    SIDES,
     STAGES,
     START,
     STATES,
@@ -53,6 +55,7 @@ from .interpolate import gains_no_angle, locate_time, step_at
 from .jit import entry, inner
 from .model import lag_of, rate_of_change
 from .physics import rates
+from .side import hold_sides
 from .step import attempt, moving, record
 from .switch import next_mode, next_saturation, snap
 
@@ -93,7 +96,7 @@ def mode_of(ints, reals, chain):
 def workplace(settings):
     """Arrays of the size of the plant."""
     n, m = settings.whole[STATES], settings.whole[INPUTS]
-    probes, length = P_ROOM + 3 * m, n + 4 * m + 6 + PIVOTS
+    probes, length = P_ROOM + 3 * m, n + 4 * m + 6 + PIVOTS + settings.whole[SIDES]
     return Work(
         np.zeros((STAGES + 1, n + m)),
         np.zeros((STAGES + 1, probes + 2)),
@@ -231,6 +234,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
     k, stages, new = work.rates, work.stages, work.vectors[END]
     probes = stages.shape[1] - 2
     known = False  # whether the rates at the start of the step are
+    fresh = True  # whether no step has been tried from here
     for _ in range(tries):
         t, steps = reals[TIME], ints[STEPS]
         if t >= end:
@@ -275,6 +279,11 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         if not h > SHORTEST * max(1.0, abs(t)) and not (at_goal or aim):
             return COLLAPSE
         h = max(h, 1e-15 * max(1.0, abs(t)))
+        # A step that an event cuts short is no time in which to stop what moves.
+        reach = max(h, reals[STEP])
+        if fresh and hold_sides(settings, mode, reach, y, k[0], work.vectors[BETWEEN]):
+            rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+        fresh = False
 
         error = attempt(settings, history, steps, mode, t, h, y, work)
         ints[EVALUATIONS] += STAGES
@@ -354,7 +363,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         t = goal if at_goal else t + h
         for i in range(size):
             y[i] = new[i]
-        steps += 1
+        steps, fresh = steps + 1, True
         ints[STEPS], reals[TIME] = steps, t
         level = pass_time_breaks(settings, history, steps, ints, following, t)
         if not linear:

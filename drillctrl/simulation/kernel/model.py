@@ -49,11 +49,13 @@ from .data import (
     STATES,
     STUCK,
     TORQUE,
+    WALL,
     WEIGHT,
 )
 from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
 from .jit import entry, inner
-from .physics import depth, load, rates, turned
+from .law import load
+from .physics import depth, rates, turned
 
 
 @inner
@@ -263,11 +265,11 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
         mode.axial,
         mode.behind,
         settings.real,
-        settings.q,
+        settings.law,
         probe,
     )
     y[excess] = weight - settings.real[WEIGHT]
-    y[excess + 1] = torque - settings.real[TORQUE]
+    y[excess + 1] = torque - settings.real[TORQUE] - settings.real[WALL]
     # What is held does not move by rounding either.
     held = mode.contact == 1 and mode.axial == HELD
     out[1] = 0.0 if held else axial + settings.real[BY_WEIGHT] * y[excess]
@@ -294,12 +296,13 @@ def move(settings, y, out):
 
 
 @entry
-def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, q, probe):
+def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, law, probe):
     """Weight and torque on bit, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
     At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
     torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5). Behind the furthest
     angle that the bit has reached they rest on the rock with that weight, and bear no torque.
+    The bit's part of the string rubs on the wall as the wear flat does on the rock.
 
     Parameters
     ----------
@@ -311,22 +314,27 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
         Z' and Φ'.
     contact, torsion, direction, behind : int
         The mode; ``direction`` is the axial one.
-    real, q : array
+    real, law : array, tuple
         As in `Settings`.
     probe : array
-        Takes the loads, and the accelerations at the ends of what they can be.
+        Takes the loads of the rock, and the accelerations at the ends of what they can be.
+
+    Returns
+    -------
+    tuple
+        Weight, and torque of rock and wall.
     """
-    by_weight, by_torque = real[BY_WEIGHT], real[BY_TORQUE]
+    by_weight, by_torque, wall = real[BY_WEIGHT], real[BY_TORQUE], real[WALL]
     axial -= by_weight * real[WEIGHT]
-    angular -= by_torque * real[TORQUE]
+    angular -= by_torque * (real[TORQUE] + wall)
     weight, torque, pressed = 0.0, 0.0, 0.0
     if contact == 1:
         sign, turning = (-1.0, 0.0) if torsion == REVERSE else (1.0, cut)
-        light = load((turning, 0.0, sign), speeds, q)
-        full = load((turning, 1.0, sign), speeds, q)
+        light = load((turning, 0.0, sign), speeds, law)
+        full = load((turning, 1.0, sign), speeds, law)
         if behind == 1:
-            light = load((cut, 0.0, 1.0), speeds, q)[0], load((0.0, 0.0, sign), speeds, q)[1]
-            full = load((cut, 1.0, 1.0), speeds, q)[0], load((0.0, 1.0, sign), speeds, q)[1]
+            light = load((cut, 0.0, 1.0), speeds, law)[0], load((0.0, 0.0, sign), speeds, law)[1]
+            full = load((cut, 1.0, 1.0), speeds, law)[0], load((0.0, 1.0, sign), speeds, law)[1]
         up, down = axial + by_weight * light[0], axial + by_weight * full[0]
         probe[P_UP], probe[P_DOWN] = up, down
         if direction == DOWN:
@@ -338,15 +346,17 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
             torque = light[1] + pressed * (full[1] - light[1])
         else:
             weight, torque = light
-    probe[P_FORWARD] = angular + by_torque * torque
+    probe[P_FORWARD] = angular + by_torque * (torque + wall)
+    whole = torque - wall if torsion == REVERSE else torque + wall
     if torsion == STUCK:
         back = 0.0
         if contact == 1:
-            back = load((0.0, pressed, -1.0), speeds, q)[1]
-        probe[P_REVERSE] = angular + by_torque * back
-        torque = -angular / by_torque
+            back = load((0.0, pressed, -1.0), speeds, law)[1]
+        probe[P_REVERSE] = angular + by_torque * (back - wall)
+        whole = -angular / by_torque
+        torque = whole if wall == 0.0 else min(max(whole, back), torque)
     probe[P_PRESSED], probe[P_WEIGHT], probe[P_TORQUE] = pressed, weight, torque
-    return weight, torque
+    return weight, whole
 
 
 @inner

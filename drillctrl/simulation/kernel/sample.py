@@ -32,6 +32,7 @@ from .data import (
     PASSES,
     PIVOTS,
     SATURATED,
+    SIDES,
     SINCE,
     START,
     STATES,
@@ -42,8 +43,9 @@ from .data import (
 )
 from .interpolate import furthest, step_at
 from .jit import entry, inner
+from .law import load
 from .model import lag_of, piece_at, rate_of_change, row_of
-from .physics import load, rates
+from .physics import rates
 from .step import recall
 
 
@@ -86,7 +88,8 @@ def evaluate(settings, history, steps, places, times, wanted):
     """
     n, m = settings.whole[STATES], settings.whole[INPUTS]
     result = np.zeros((wanted.shape[0], times.shape[0]))
-    y, out, probe = np.zeros(n + 4 * m + 6 + PIVOTS), np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
+    y = np.zeros(n + 4 * m + 6 + PIVOTS + settings.whole[SIDES])
+    out, probe = np.zeros(n + m), np.zeros(P_ROOM + 3 * m)
     # At rest the velocity is known; its interpolation is off by rounding.
     standing = rates((0.0, 0.0, 0.0, 0.0), settings.bit)
     linear = settings.whole[LINEAR] == 1
@@ -111,7 +114,9 @@ def evaluate(settings, history, steps, places, times, wanted):
             rate_of_change(settings, history, steps, mode, t, y, out, probe)
         if linear and not stored:
             speeds = rates((y[0], y[1], y[2], y[3]), settings.bit)
-            probe[P_WEIGHT], probe[P_TORQUE] = load((probe[P_DEPTH], 1.0, 1.0), speeds, settings.q)
+            probe[P_WEIGHT], probe[P_TORQUE] = load(
+                (probe[P_DEPTH], 1.0, 1.0), speeds, settings.law
+            )
         for c in range(wanted.shape[0]):
             which = wanted[c]
             if which >= C_STATES:

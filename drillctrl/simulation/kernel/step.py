@@ -26,9 +26,11 @@ from .data import (
     OTHERS,
     P_DEPTH,
     PASSES,
+    PIVOTS,
     QUARTIC,
     RTOL,
     SATURATED,
+    SIDES,
     STAGES,
     START,
     STATES,
@@ -117,6 +119,8 @@ def attempt(settings, history, steps, mode, t, h, y, work):
     probes = stages.shape[1] - 2
     for i in range(n + m, n + 2 * m):
         new[i] = y[i]
+    for i in range(n + 4 * m + 6 + PIVOTS, n + 4 * m + 6 + PIVOTS + settings.whole[SIDES]):
+        new[i] = y[i]
     for stage in range(1, STAGES):
         # Along the states, which stand side by side.
         for i in range(size):
@@ -175,6 +179,8 @@ def record(settings, history, j, mode, t, h, y, work, level):
     held = OTHERS + QUARTIC * (n + m - 4)
     for i in range(m):
         real[j, held + i] = y[n + m + i]
+    for i in range(settings.whole[SIDES]):
+        real[j, held + m + i] = y[n + 4 * m + 6 + PIVOTS + i]
     whole[j, CONTACT], whole[j, TORSION], whole[j, AXIAL] = mode.contact, mode.torsion, mode.axial
     whole[j, LEVEL], whole[j, LAG], whole[j, FACE] = level, mode.lag, mode.face
     whole[j, PASSES], whole[j, SATURATED] = mode.passes, mode.saturated
@@ -191,3 +197,5 @@ def recall(settings, history, j, s, y):
     held = OTHERS + QUARTIC * (n + m - 4)
     for i in range(m):
         y[n + m + i] = real[j, held + i]
+    for i in range(settings.whole[SIDES]):
+        y[n + 4 * m + 6 + PIVOTS + i] = real[j, held + m + i]

@@ -21,11 +21,11 @@ from drillctrl.base.files import check_regular, write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.designs.result import Analysis
 from drillctrl.drilling.plant import Plant, paper_plant
+from drillctrl.interop.saved_kinds import CLASSES, RESULTS, Result
 from drillctrl.simulation.kept import kept_run, restored_run
 from drillctrl.simulation.result import Simulation
 from drillctrl.spectrum.roots import spectral_abscissa
 from drillctrl.studies.campaign import Campaign
-from drillctrl.studies.saved_kinds import CLASSES, RESULTS, Result
 from drillctrl.studies.trial import OUTCOMES
 
 SCHEMA = "drillctrl/result/1"
@@ -42,7 +42,7 @@ def save_result(result: Result, path: str | Path) -> None:
     ----------
     result : Design, Analysis, Simulation, Campaign, Comparison, VibrationMap or RigReport
         The result, of any plant; also a StabilityChart, StabilisableChart or StabilityVolume,
-        a BitResponse, BitBand or DrillingMotion.
+        a BitResponse, BitBand, DrillingMotion, RecordStudy or DriveComparison.
     path : str or Path
         A name that ends in .json.
 
