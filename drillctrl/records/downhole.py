@@ -11,7 +11,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
-from drillctrl.records.families import line_of
+from drillctrl.records.families import line_of, lump_frequency
 from drillctrl.records.record import Record
 from drillctrl.records.surface import (
     Carrier,
@@ -27,6 +27,8 @@ from drillctrl.strings.rig import StringRig
 _SHORTEST, _PIECE = 60.0, 40.0
 # Weight on bit is taken over so many seconds, and as at least so much of its mean.
 _SMOOTH, _LEAST_WEIGHT, _MOST_MISSING = 5.0, 0.1, 0.2
+# A disc on a spring stands for a string up to so many times its frequency, where a second mode is.
+_LUMP = 4.0
 TORQUE_OF = ("drive", "pipe")
 
 
@@ -145,6 +147,9 @@ def prepare(
             raise InputError("record", record.source, "of a speed and a torque that move")
         spectra = found
         highest = narrower * best_highest(carrier, spectra, record.step)
+        lump = lump_frequency(carrier.line)
+        if lump is not None:
+            highest = min(highest, _LUMP * lump)
     else:
         spectra, highest = like.spectra, like.highest
     weight = relative_weight(record, mean_weight(record))
