@@ -250,7 +250,11 @@ class Plane:
         if "wob" in given:
             moving = set()
         held = np.column_stack([np.zeros(count), *(given[n] for n in given if n not in moving)])
-        _, first, where = np.unique(held, axis=0, return_index=True, return_inverse=True)
+        first = where = np.zeros(count, dtype=np.intp)
+        if (held == held[:1]).all():
+            first = first[:1]
+        else:
+            _, first, where = np.unique(held, axis=0, return_index=True, return_inverse=True)
         # Speed and rate move two groups alone: a point for each rig will do.
         places = {name: v[first] for name, v in given.items()}
         known = self._rig_points(places, first.size)
