@@ -88,7 +88,9 @@ def verdict(system: DelaySystem, further: float) -> tuple[str, str]:
     left = count_right_of(system, alpha - room).count
     if right is None or left is None:
         return "refused", "the count beside the rightmost root"
-    if right != 0 or left < top.multiplicity * (2 if top.imag > 0 else 1):
+    # Of roots that are told apart only by a circle the line may leave out all but one.
+    together = top.multiplicity if top.rightmost == top.real else 1
+    if right != 0 or left < together * (2 if top.imag > 0 else 1):
         return "silent", f"α = {alpha!r}: {right} right of it, {left} with it"
     line = alpha - further / system.max_delay
     try:

@@ -22,6 +22,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drive_tuned import TUNED
+from drillctrl.strings.drive_verdict import UNTRIED
 from drillctrl.strings.drives import (
     ON_LOAD,
     DriveComparison,
@@ -38,9 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from drillctrl.designs.result import Analysis
-
-
-_UNTRIED = "not been tried on the nonlinear motion"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,19 +88,15 @@ class DriveDesign:
 
         False too where it does its string harm, whatever the bit does.
         """
-        if not self.drive.verdict.recommended:
-            return False
-        return not self.trials[0].verdict.harm if self.trials else None
+        verdict = self.drive.verdict
+        return not self.trials[0].verdict.harm if self.trials else verdict.untried
 
     @property
     def reason(self) -> str:
         """One sentence why."""
         if self.trials:
             return self.trials[0].verdict.reason
-        told = self.drive.verdict.reason()
-        return (
-            told if self.recommended is False else f"it has {_UNTRIED}; of the string alone, {told}"
-        )
+        return self.drive.verdict.untried_reason()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -143,7 +137,7 @@ class DriveDesign:
         if not self.drive.verdict.recommended:
             first = refusal(self.drive, language)
         elif self.recommended is None:
-            first += f" It has {_UNTRIED}: runs need a point, a speed and a feed."
+            first += f" It was {UNTRIED}: runs need a speed and a feed."
         elif not self.recommended:
             first = f"Refused: {self.drive.control.name}, {self.reason}."
         elif self.asked != self.drive.control.name:

@@ -246,8 +246,9 @@ def factor(quantity: str, unit: str, where: str) -> float:
         If it is no unit of that.
     """
     dimension = QUANTITIES[quantity]
-    # Rotary speed as drives and logs write it.
     spelt = {"c/min": "rpm", "rev/min": "rpm", "u/min": "rpm"}.get(unit.lower(), unit)
+    if unit.isupper():  # As LAS files shout: KN.M
+        spelt = re.sub(r"\bkn(?=m?\b)|\bn(?=m?\b)", lambda m: m[0][:-1] + "N", spelt.lower())
     try:
         return units.to_si(where, f"1 {spelt}", dimension)
     except InputError as error:

@@ -11,7 +11,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
-from drillctrl.records.families import line_of
+from drillctrl.records.families import line_of, lump_frequency
 from drillctrl.records.record import Record
 from drillctrl.records.surface import (
     Carrier,
@@ -25,8 +25,12 @@ from drillctrl.strings.rig import StringRig
 
 # Stretches shorter than this are not carried down, s; spectra are of pieces of so much.
 _SHORTEST, _PIECE = 60.0, 40.0
+# A piece of fewer samples is no motion.
+_FEWEST = 16
 # Weight on bit is taken over so many seconds, and as at least so much of its mean.
 _SMOOTH, _LEAST_WEIGHT, _MOST_MISSING = 5.0, 0.1, 0.2
+# A disc on a spring stands for a string up to so many times its frequency, where a second mode is.
+_LUMP = 4.0
 TORQUE_OF = ("drive", "pipe")
 
 
@@ -142,9 +146,14 @@ def prepare(
     if like is None:
         found = record_spectra(record)
         if found is None:
-            raise InputError("record", record.source, "of a speed and a torque that move")
+            raise InputError(
+                "record", record.source, "of a speed and a torque that move, seen often"
+            )
         spectra = found
         highest = narrower * best_highest(carrier, spectra, record.step)
+        lump = lump_frequency(carrier.line)
+        if lump is not None:
+            highest = min(highest, _LUMP * lump)
     else:
         spectra, highest = like.spectra, like.highest
     weight = relative_weight(record, mean_weight(record))
@@ -185,7 +194,8 @@ def record_spectra(record: Record) -> Spectra | None:
     """Return the spectra of top speed and torque; None where no stretch lasts a minute."""
     cuts = record.segments("rotary_speed", "torque", shortest=_SHORTEST)
     speed, torque = record.values["rotary_speed"], record.values["torque"]
-    if not cuts or not (np.nanstd(speed) > 0.0 and np.nanstd(torque) > 0.0):
+    slow = record.step > _PIECE / _FEWEST
+    if slow or not cuts or not (np.nanstd(speed) > 0.0 and np.nanstd(torque) > 0.0):
         return None
     pieces = [speed[cut] for cut in cuts], [torque[cut] for cut in cuts]
     return surface_spectra(*pieces, record.step, _PIECE)

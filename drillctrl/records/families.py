@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,8 @@ class Family:
         First guess and bounds.
     base : Line or None
         What is scaled; None of pipe above a disc of which nothing is known.
-    lumped : (float, float)
-        Stiffness and inertia of the base lumped to one spring and disc.
+    lumped : (float, float) or None
+        Stiffness and inertia of the rig that was given, lumped to one spring and disc.
     single : bool
         Whether the base is nothing else.
     """
@@ -41,7 +41,7 @@ class Family:
     low: tuple[float, ...]
     high: tuple[float, ...]
     base: Line | None = None
-    lumped: tuple[float, float] = (0.0, 0.0)
+    lumped: tuple[float, float] | None = None
     single: bool = False
 
     def line(self, values: Sequence[float]) -> Line:
@@ -67,6 +67,7 @@ class Family:
         """Return stiffness and inertia of one spring and disc instead, N m/rad and kg m²."""
         if self.base is None:
             return float(values[0]), float(values[2] + values[1] / 3.0)
+        assert self.lumped is not None
         return float(values[0] * self.lumped[0]), float(values[1] * self.lumped[1])
 
 
@@ -116,6 +117,15 @@ def line_of(rig: Rig) -> Line:
     return pipe_and_disc(rig.torsional_stiffness, 0.0, rig.inertia, rate)
 
 
+def lump_frequency(line: Line) -> float | None:
+    """Return the frequency of a disc on a spring, Hz; None of a line that carries waves."""
+    spring = line.stretches[0].mean()
+    if spring.mass > 0.0:
+        return None
+    disc = sum(one.length * one.mass for one in (each.mean() for each in line.stretches))
+    return math.sqrt(spring.stiffness / spring.length / disc) / (2.0 * math.pi)
+
+
 def damping_of(line: Line) -> float:
     """Return the viscous damping of a line over its inertia, 1/s."""
     pieces = [stretch.mean() for stretch in line.stretches]
@@ -136,6 +146,15 @@ def family_of(rig: Rig) -> Family:
         (rig.torsional_stiffness, rig.inertia),
         not isinstance(rig, StringRig),
     )
+
+
+def families_of(rig: Rig) -> list[list[Family]]:
+    """Return a rig's own line; before that of a lumped rig pipe above a disc as stiff and heavy."""
+    own = family_of(rig)
+    if not own.single:
+        return [[own]]
+    given = rig.torsional_stiffness, rig.inertia
+    return [[replace(unknown_family(*given, share), lumped=given) for share in (2.0, 0.4)], [own]]
 
 
 def unknown_family(stiffness: float, inertia: float, share: float) -> Family:

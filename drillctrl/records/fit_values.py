@@ -14,6 +14,8 @@ from drillctrl.strings.line import Line
 
 # What is less well known than this is not known (95 %, relative).
 _KNOWN = 0.34
+# And of what is less well known than this nothing is.
+_SEEN = 1e3
 
 
 @dataclass(frozen=True)
@@ -35,12 +37,17 @@ class Estimate:
     @property
     def relative(self) -> float:
         """Half the interval over the value."""
-        return (self.high - self.low) / (2.0 * self.value) if self.value else math.inf
+        return (self.high - self.low) / (2.0 * abs(self.value)) if self.value else math.inf
 
     @property
     def known(self) -> bool:
         """Whether the record says it to a third."""
         return self.relative < _KNOWN
+
+    @property
+    def seen(self) -> bool:
+        """Whether the record says anything of it."""
+        return self.relative < _SEEN
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields."""

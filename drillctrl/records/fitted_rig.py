@@ -11,6 +11,7 @@ from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
+from drillctrl.records.families import damping_of, line_of
 from drillctrl.records.fit_values import RecordFit
 from drillctrl.strings.drill_string import DrillString
 from drillctrl.strings.rig import StringRig, string_rig
@@ -27,7 +28,7 @@ def fitted_rig(rig: Rig, fit: RecordFit) -> Rig:
     """Return a rig whose string is as stiff, heavy and damped in torsion as a fit found it.
 
     Stiffness enters through the shear modulus, inertia through the weight per metre, so axial
-    inertia follows it.
+    inertia follows it. Damping that the record does not tell stays the rig's.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def fitted_rig(rig: Rig, fit: RecordFit) -> Rig:
     if not fit.identifiable:
         raise InputError("fit", "no string", f"one that the record tells ({fit.reasons[0]})")
     stiffer, heavier = fit.factors
-    damping = fit.damping.value
+    damping = fit.damping.value if fit.damping.seen else damping_of(line_of(rig))
     if not isinstance(rig, StringRig):
         inertia = heavier * rig.inertia
         return replace(
@@ -107,12 +108,12 @@ def save_fit(rig: Rig, fit: RecordFit, path: str | Path) -> None:
         name: {"low": e.low, "high": e.high, "error": min(e.relative, 0.9)}
         for name in ("stiffness", "inertia", "damping", "level", "drop", "decay", "lag")
         for e in (getattr(fit, name),)
-        if e.relative < 1e6
+        if e.seen
     }
     data["fit"] = {
         "stiffness": fit.stiffness.value,
         "inertia": fit.inertia.value,
-        "damping": fit.damping.value,
+        **({"damping": fit.damping.value} if fit.damping.seen else {}),
         "bit_law": fit.law._asdict(),
         "uncertainty": errors,
     }

@@ -22,7 +22,7 @@ from drillctrl.records.downhole import (
     prepare,
     relative_weight,
 )
-from drillctrl.records.families import Family, family_of, unknown_family
+from drillctrl.records.families import Family, families_of, unknown_family
 from drillctrl.records.fit_values import Estimate, RecordFit
 from drillctrl.records.law import BitLaw
 from drillctrl.records.peaks import Peak
@@ -106,7 +106,22 @@ def fit_record(
     inertia = drive_inertia(record, rig, torque_of, own_inertia)
     end = share * record.duration
     first = record.part(0.0, end) if share < 1.0 else record
-    families = [family_of(rig)] if rig is not None else _unknown(first)
+    for families in [_unknown(first)] if rig is None else families_of(rig):
+        fit = _fitted(record, first, end, families, inertia, lag)
+        if fit.identifiable:
+            break
+    return fit
+
+
+def _fitted(
+    record: Record,
+    first: Record,
+    end: float,
+    families: list[Family],
+    inertia: float,
+    lag: float | None,
+) -> RecordFit:
+    """Return the best fit of some families."""
     best: tuple[Descent, Family, Prepared] | None = None
     for family in families:
         prepared = _floored(prepare(first, Carrier(family.line(family.start), inertia)), first)
@@ -245,7 +260,8 @@ def _told(
     mass = estimate(lambda v: family.effective(v.tolist())[1])
     place = family.names.index("damping")
     inside = 1.02 * family.low[place] < found.values[place] < 0.98 * family.high[place]
-    damping = estimate(lambda v: float(v[place]), free=bool(inside))
+    # At a disc damping does just what a slope of the bit's torque does.
+    damping = estimate(lambda v: float(v[place]), free=bool(inside and not family.single))
     carrier = Carrier(line(found.values), inertia, late.value)
     first = record.part(0.0, end)
     try:
@@ -259,9 +275,9 @@ def _told(
         damping=damping,
         **law,
         lag=late,
-        factors=(found.value("stiffness"), found.value("inertia"))
-        if family.base is not None
-        else None,
+        factors=None
+        if family.lumped is None
+        else (stiffness.value / family.lumped[0], mass.value / family.lumped[1]),
         modes=_modes(found, family),
         line=carrier.line,
         drive_inertia=inertia,
@@ -299,9 +315,10 @@ def _reasons(
     if not (stiffness.known and inertia.known):
         told.append("stiffness and inertia change what is seen alike: the bit hardly swings")
     if not damping.known:
+        limits = f" closer than from {damping.low:.2g} to {damping.high:.2g} 1/s"
         told.append(
-            f"damping cannot be told closer than from {damping.low:.2g} to {damping.high:.2g} 1/s: "
-            "the fall of the bit's torque changes what is seen alike"
+            f"damping cannot be told{limits if damping.seen else ''}: the fall of the bit's torque "
+            "changes what is seen alike"
         )
     unknown = [name for name, value in law.items() if not value.known]
     if unknown:

@@ -14,6 +14,8 @@ _STANDS = 10.0
 _FAR, _FEW = 3.0, 0.002
 # Two columns that both change so many-fold from one stretch of so many seconds to the next.
 _FOLD, _STRETCH = 5.0, 10.0
+# A leap is so many times what moves beside it.
+_LEAP = 3.0
 _MOVING = ("rotary_speed", "torque", "bit_speed", "bit_torque")
 
 
@@ -48,7 +50,46 @@ def without_spikes(
             count = int(spikes.sum())
             notes.append(f"{count} of {told} far beyond all others left out, from {at:g} s on")
         notes += _standing(times, data, told)
+        notes += _turned(times, kept[name], told)
+    if "torque" in rows:
+        notes += _shifted(times, kept["torque"], step)
     return kept, [*notes, *_mixed(times, rows, step)]
+
+
+def _turned(times: FloatArray, data: FloatArray, told: str) -> list[str]:
+    """Say for how long a column has the other sign."""
+    usual = np.sign(np.nanmedian(data))
+    wrong = usual * data < -0.1 * np.nanmedian(np.abs(data))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(int)))
+    if not edges.size:
+        return []
+    begin, end = edges[::2], edges[1::2] - 1
+    place = int(np.argmax(times[end] - times[begin]))
+    long = times[end[place]] - times[begin[place]]
+    if long < _STANDS:
+        return []
+    return [f"{told} has the other sign for {long:.4g} s from {times[begin[place]]:g} s on"]
+
+
+def _shifted(times: FloatArray, torque: FloatArray, step: float) -> list[str]:
+    """Say where torque leaps by far more than it moves before and after."""
+    per = max(4, round(_STRETCH / step))
+    parts = [torque[a : a + per] for a in range(0, torque.size - per + 1, per)]
+    if len(parts) < 4 or not all(np.isfinite(part).any() for part in parts):
+        return []
+    middle = np.array([np.nanmedian(part) for part in parts])
+    moves = np.array([np.nanmax(part) - np.nanmin(part) for part in parts])
+    leap = np.abs(middle[3:] - middle[:-3])
+    far = leap > _LEAP * np.maximum(moves[3:], moves[:-3])
+    turns = np.minimum(np.abs(middle[3:]), np.abs(middle[:-3])) > 0.05 * np.nanmax(np.abs(middle))
+    found = np.flatnonzero(far & turns)
+    if not found.size:
+        return []
+    place = int(found[np.argmax(leap[found])])
+    return [
+        f"torque leaps by {leap[place] / 1e3:.3g} kN·m near {times[per * (place + 2)]:.4g} s, far "
+        "beyond its motion: is that the rig's?"
+    ]
 
 
 def _standing(times: FloatArray, data: FloatArray, told: str) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +30,9 @@ _FEWEST_ROWS = 50
 _MOST_SAMPLES = 20_000_000
 # A gap is longer than so many steps.
 _GAP = 5.0
+_POINT, _THOUSANDS = re.compile(r"[-+]?\d+\.\d+"), re.compile(r"[-+]?\d{1,3}(,\d{3})+")
+# Fewer stamps than this do not tell how far apart they are.
+_STAMPS = 4
 DATES = ("day-first", "month-first")
 
 
@@ -140,6 +144,7 @@ def read_record(
     column, taken = found.pop(TIME)
     times, start, more = instants(column, taken, source, dates)
     notes += more
+    _check_signs([column, *(one for one, _ in found.values())], source)
     values = {}
     for name, (column, what) in found.items():
         assert what.unit is not None
@@ -159,6 +164,17 @@ def read_record(
     step, values, done = _even(times, values, source)
     told = [taken, *(what for _, what in found.values())]
     return Record(source, step, values, tuple(told), start, (*notes, *done))
+
+
+def _check_signs(columns: Iterable[Column], source: str) -> None:
+    """Refuse commas that may be thousands: all before three digits, beside decimal points."""
+    texts = [column for column in columns if isinstance(column.cells, list)]
+    points = any(_POINT.fullmatch(cell) for column in texts for cell in column.cells)
+    for column in texts:
+        told = [cell for cell in column.cells if "," in cell]
+        if points and told and all(_THOUSANDS.fullmatch(cell) for cell in told):
+            wanted = "without commas: of thousands or of decimals, while others have points?"
+            raise InputError(f"{column.name} of {source}", told[0], wanted)
 
 
 def _numbers(column: Column, source: str) -> FloatArray:
@@ -234,6 +250,9 @@ def _without_repeats(
         within = np.arange(times.size) - np.repeat(first, counts)
         usual = float(np.median(counts))
         spread = times + unit * within / np.repeat(np.maximum(counts, usual), counts)
+        if first.size < _STAMPS:
+            wanted = f"finer: {first.size} different ones cannot tell {times.size} rows apart"
+            raise InputError("times of the record", f"{usual:g} rows alike", wanted)
         notes.append(f"about {usual:g} rows share each time and were spread evenly over {unit:g} s")
         keep = np.concatenate([[True], np.diff(spread) > 0.0])
         return spread[keep], {name: data[keep] for name, data in rows.items()}, notes

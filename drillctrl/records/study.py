@@ -159,6 +159,11 @@ def study_record(
     record = record.slower(_STEP)
     notes = [*record.notes]
     values = record.values
+    if torque_of is None and "torque" in values:
+        whose = (
+            f"drive's, of {inertia:.4g} kg·m²" if inertia else "pipe's: no drive's inertia is known"
+        )
+        notes.append(f"the torque was taken for the {whose}")
     name = "torque" if "torque" in values else "bit_speed"
     period = period_of(values[name], record.step, record.segments(name, shortest=10.0))
     surface = {"rotary_speed", "torque"} <= values.keys()
@@ -267,8 +272,8 @@ def _drive(
     pipe = None
     if isinstance(rig, StringRig):
         pipe = rig.string.torsion.wave_impedance
-    elif rig is None and found is not None and found.identifiable:
-        pipe = found.line.wave_impedance
+    elif found is not None and found.identifiable:
+        pipe = found.line.wave_impedance or None
     late = lag or 0.0
     if found is not None and found.identifiable:
         late = found.lag.value

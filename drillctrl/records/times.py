@@ -74,7 +74,8 @@ def _in_seconds(
         unit = "s"
         notes = [f"{name} has no unit and was taken as seconds"]
     where = f"unit of {name} in {source}"
-    factor = units.to_si(where, f"1 {_NAMED.get(unit.lower(), unit)}", units.TIME)
+    spelt = _NAMED.get(unit.lower(), unit.lower() if unit.isupper() else unit)
+    factor = units.to_si(where, f"1 {spelt}", units.TIME)
     return values * factor, None, notes
 
 

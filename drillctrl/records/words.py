@@ -11,6 +11,7 @@ from drillctrl.base.text import set_out, wrapped
 if TYPE_CHECKING:
     from drillctrl.records.findings import Findings
     from drillctrl.records.fit_values import Estimate, RecordFit
+    from drillctrl.records.peaks import Peak
 
 _RPM = 30.0 / np.pi
 _FULL = 1.0
@@ -88,8 +89,7 @@ def _modes(study: Findings) -> str:
         return "none can be told"
     source = {"fit": "of the fitted string", "spectrum": "peaks of the torque"}
     told = ", ".join(
-        f"{mode.frequency:.4f} ± {mode.error:.4f} Hz ({100.0 * mode.damping_ratio:.1f} % damped)"
-        for mode in study.modes
+        f"{mode.frequency:.4f} ± {mode.error:.4f} Hz" + _damped(mode) for mode in study.modes
     )
     return f"{told}, {source[study.modes_from or 'fit']}"
 
@@ -165,6 +165,11 @@ def _fit_verdict(fit: RecordFit) -> str:
             "in units of noise"
         )
     return "; ".join([told, *fit.reasons])
+
+
+def _damped(mode: Peak) -> str:
+    known = mode.damping_error < mode.damping_ratio
+    return f" ({100.0 * mode.damping_ratio:.1f} % damped)" if known else ""
 
 
 def _estimate(value: Estimate, factor: float, unit: str) -> str:

@@ -30,6 +30,8 @@ _ASTRAY = 1e-2
 _LARGEST_CLUSTER = 24
 # A count on a circle that is off by more is disturbed by a root close to it.
 _SHARP_COUNT = 1e-8
+# Relative rounding of a mean over the circle, at least.
+_LEAST_NOISE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -207,19 +209,21 @@ def _multiple_root(
     change = _change(system, refined, tight, ratio)
     if change > MULTIPLICITY_TOLERANCE:
         return None
-    if change > ROUNDING_TOLERANCE:
-        # So close together the iteration may come to rest between roots: the circle knows better.
-        exact = centre + _from_moments(np.array([(slope * ring ** (j + 1)).mean() for j in
-                                                 range(1, size + 1)]))  # fmt: skip
-        astray = np.abs(exact[:, None] - members[None, :]).min(axis=1).max()
-        if astray > _ASTRAY * spread:
-            members, spread = exact, float(np.abs(exact - exact.mean()).max())
+    # So close together the iteration may come to rest between roots: the circle knows better.
+    exact = centre + _from_moments(np.array([(slope * ring ** (j + 1)).mean() for j in
+                                             range(1, size + 1)]))  # fmt: skip
+    apart = float(np.abs(exact - exact.mean()).max())
+    astray = np.abs(exact[:, None] - members[None, :]).min(axis=1).max()
+    # How far rounding throws numbers apart that are told by their power sums.
+    thrown = reach * max(abs(count - size), _LEAST_NOISE) ** (1.0 / size)
+    rounding = change <= ROUNDING_TOLERANCE and apart < 8.0 * thrown
+    if not rounding and astray > _ASTRAY * spread:
+        members, spread = exact, apart
     outer = characteristic.smallest_singular(system, refined + ring)
     weight = float(characteristic.weight(system, np.array([refined]))[0])
     residual = float(characteristic.smallest_singular(system, np.array([refined]))[0]) / weight
     if residual > MULTIPLICITY_TOLERANCE:
         return None
-    rounding = change <= ROUNDING_TOLERANCE
     return Root(
         refined.real,
         abs(refined.imag),

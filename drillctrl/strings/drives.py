@@ -82,7 +82,7 @@ class DriveComparison:
             {
                 "structure": drive.control.name,
                 "stable": drive.stable,
-                "recommended": drive.verdict.recommended,
+                "recommended": drive.verdict.untried,
                 "delay_margin": drive.delay_margin,
                 **mode.to_dict(),
             }

@@ -153,3 +153,45 @@ def test_the_nearest_run_is_found():
     assert found.rows()[-1] == {
         "speed": 10.0, "weight_on_bit": 2e4, "outcome": "d", "swing": None
     }  # fmt: skip
+
+
+def test_what_is_damaged_by_whole_stretches_is_said(rows, tmp_path):
+    flipped, leaps = rows.copy(), rows.copy()
+    flipped[600:900, 2] *= -1.0
+    leaps[700:, 2] += 30.0
+    for odd, word in (
+        (flipped, "torque has the other sign for 29.9 s from 60 s on"),
+        (leaps, "torque leaps by 30"),
+    ):
+        notes = read_record(written(odd, tmp_path / "odd.csv")).notes
+        assert any(note.startswith(word) for note in notes), notes
+    # Two stamps only: how far apart they are is not told.
+    stamps = rows.copy()
+    stamps[:, 0] = np.where(np.arange(1500) < 700, 0.0, 128.0)
+    with pytest.raises(InputError, match="cannot tell 1500 rows apart"):
+        read_record(written(stamps, tmp_path / "stamps.csv"))
+    # Commas of thousands, or of decimals?
+    lines = [f"{t:.1f};{n:.2f};{1e3 * m:,.0f};{w:.1f}" for t, n, m, w in rows]
+    path = tmp_path / "commas.csv"
+    path.write_text("\n".join([HEAD.replace(",", ";").replace("kN.m", "N.m"), *lines]))
+    with pytest.raises(InputError, match="of thousands or of decimals"):
+        read_record(path)
+    # A step of 100 s, which milliseconds taken for seconds make, shows nothing and breaks nothing.
+    slow = rows.copy()
+    slow[:, 0] *= 1000.0
+    study = study_record(read_record(written(slow, tmp_path / "slow.csv")), table1(), fit=False)
+    assert study.bit is None
+    assert any("nothing faster than 0.004 Hz" in note for note in study.notes)
+
+
+def test_las_files_shout_their_units(rows, tmp_path):
+    pytest.importorskip("lasio")
+    head = (
+        "~V\nVERS. 2.0:\nWRAP. NO:\n~W\nSTRT.S 0:\nSTOP.S 149.9:\nSTEP.S 0.1:\nNULL. -999.25:\n"
+        "~C\nTIME.S :\nRPM.RPM :\nTORQUE.KN.M :\nWOB.KN :\n~A\n"
+    )
+    path = tmp_path / "shouts.las"
+    path.write_text(head + "\n".join(" ".join(f"{x:.4f}" for x in row) for row in rows))
+    values = read_record(path).values
+    np.testing.assert_allclose(values["torque"], 1e3 * rows[:, 2], rtol=1e-5)
+    np.testing.assert_allclose(values["weight_on_bit"], 1e3 * rows[:, 3], rtol=1e-5)

@@ -71,6 +71,12 @@ def test_a_lumped_rig_comes_back_too(tmp_path):
     read = load_rig(tmp_path / "fitted.toml")
     assert read == fitted_rig(rig, fit_of(rig))
     assert read.torsional_damping == pytest.approx(0.2 * read.inertia)
+    unseen = replace(fit_of(rig), damping=Estimate(1e-4, 1e-12, 1e4))
+    save_fit(rig, unseen, tmp_path / "unseen.toml")
+    own = rig.torsional_damping / rig.inertia
+    assert load_rig(tmp_path / "unseen.toml").torsional_damping == pytest.approx(own * read.inertia)
+    assert "damping = 0.0001" not in (tmp_path / "unseen.toml").read_text()
+    assert Estimate(-0.02, -0.05, 0.01).relative == pytest.approx(1.5)
 
 
 def test_the_box_of_worst_case_design(tmp_path):

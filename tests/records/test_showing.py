@@ -15,6 +15,7 @@ from drillctrl import (
     fit_record,
     load_rig,
     read_record,
+    save_fit,
     study_record,
     table1,
 )
@@ -153,11 +154,32 @@ def test_a_lumped_rig_is_fitted(tmp_path):
     study = study_record(record_of(0.05 * np.arange(count), top, torque), wrong)
     assert study.fit.stiffness.value == pytest.approx(stiffness, rel=0.03)
     assert study.fit.inertia.value == pytest.approx(inertia, rel=0.03)
+    assert not study.fit.damping.seen
     (mode,) = study.modes
     assert mode.frequency == pytest.approx(np.sqrt(stiffness / inertia) / (2 * np.pi), rel=0.02)
     windows = out[:, 2].reshape(-1, 400)
     truth = np.median(np.ptp(windows, axis=1) / (2.0 * windows.mean(axis=1)))
     assert study.swing == pytest.approx(truth, abs=0.05)
+
+
+def test_a_lumped_rig_stands_for_a_string(sticking, tmp_path):
+    """What is known as a disc on a spring is recorded as pipe and collars, which carry waves."""
+    time, top, torque, bit = sticking
+    j, k = RIG.chain()
+    stiffness, inertia = 1.0 / np.sum(1.0 / k[:40]), j[:40].sum() / 3.0 + j[40:].sum()
+    wrong = replace(table1(), torsional_stiffness=1.1 * stiffness, inertia=0.9 * inertia)
+    study = study_record(record_of(time, top, torque), wrong, own_inertia=RIG.drive)
+    assert study.fit.stiffness.low < stiffness < study.fit.stiffness.high
+    assert study.fit.inertia.low < inertia < study.fit.inertia.high
+    assert study.fit.factors[0] == pytest.approx(1.0 / 1.1, rel=0.04)
+    np.testing.assert_allclose([m.frequency for m in study.modes[:2]], RIG.modes(2), rtol=0.02)
+    known = np.isfinite(study.bit.speed)
+    assert (study.bit.speed[known] / RPM - bit[known]).std() < 0.1 * bit.std()
+    assert study.drive.reflection is not None
+    save_fit(wrong, study.fit, tmp_path / "fitted.toml")
+    read = load_rig(tmp_path / "fitted.toml")
+    assert read.torsional_stiffness == pytest.approx(study.fit.stiffness.value)
+    assert read.inertia == pytest.approx(study.fit.inertia.value)
 
 
 def test_nothing_needs_to_be_known_of_the_string(sticking):

@@ -111,3 +111,13 @@ def test_eight_delays_of_vyhlidal_and_zitek():
         ]
         terms.append(0.2 * s**8)
         assert abs(sum(terms)) < 1e-9 * sum(map(abs, terms))
+
+
+def test_a_circle_tells_apart_what_the_smallest_change_would_make_one():
+    """A root beside a sevenfold zero: a change of 1e-15 would make it one eightfold root."""
+    system = agreement.random_system(42008763)
+    alpha = spectral_abscissa(system)
+    assert alpha == pytest.approx(0.01476, rel=1e-4)
+    assert count_right_of(system, alpha + 1e-4).count == 0
+    assert count_right_of(system, alpha - 1e-4).count == 1
+    assert agreement.verdict(system, 1.0) == ("agrees", "")
