@@ -28,6 +28,8 @@ from .designs.design import design as design
 from .designs.drilling import Drilling as Drilling
 from .designs.drive_design import DriveDesign as DriveDesign
 from .designs.drive_design import design_drive as design_drive
+from .designs.drive_load import bit_load as bit_load
+from .designs.drive_motion import DriveMotion as DriveMotion
 from .designs.drive_trials import DriveTrials as DriveTrials
 from .designs.drive_trials import best_tried as best_tried
 from .designs.drive_trials import drive_trials as drive_trials
@@ -167,6 +169,7 @@ from .spectrum.semidiscretization import SemiDiscretization as SemiDiscretizatio
 from .spectrum.semidiscretization import semidiscretize as semidiscretize
 from .spectrum.trust import compare_spectra as compare_spectra
 from .spectrum.trust import intervals_for as intervals_for
+from .strings.bit_load import BitLoad as BitLoad
 from .strings.catalogue import pipe as pipe
 from .strings.catalogue import pipe_names as pipe_names
 from .strings.changed import changed_rig as changed_rig

@@ -20,6 +20,11 @@ settings.register_profile(
 settings.load_profile("drillctrl")
 
 
+def pytest_collection_modifyitems(items):
+    """Let one process begin with the simulator: the other finds it compiled when it comes to it."""
+    items.sort(key=lambda item: item.path.parts[-2:] != ("simulation", "test_string.py"))
+
+
 @pytest.fixture(scope="session")
 def point_c():
     """Point C of Fig. 8."""

@@ -96,7 +96,7 @@ def check(drawn, *units):
     assert len(found) >= 2
     told = set()
     for label in found:
-        quantity, comma, unit = label.rpartition(", ")
+        quantity, comma, unit = label.replace("\n", " ").rpartition(", ")
         assert comma, label
         assert unit in (*OF_RIGS, *PLAIN), label
         assert sum(letter.isalpha() for letter in quantity) >= 1, label

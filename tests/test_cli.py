@@ -94,7 +94,14 @@ def test_require_stable(capsys):
 
 AT_RIG = ("--rig", "table1", "--speed", "120 rpm", "--rop", "20 m/h")
 CONTROLLED = ("simulate", *AT_RIG, "--structure", "p")
+_POINT = ("--rig", "table1", "--speed", "90 rpm", "--rop", "2 m/h")
 BAD = [
+    (["simulate", "--initial", "dx=1, dx=2"], "--initial = dx: must be given once"),
+    (
+        ["simulate", *_POINT, "--initial", "x=1 mm,x=2 mm"],
+        "--initial = x: must be given once",
+    ),
+    (["design", "--bound", "K1=-1:1", "--bound", "K1=-5:5"], "--bound = K1: must be given once"),
     (["analyze", "--omega0", "0"], "omega0 = 0.0: must be"),
     (["analyze", "--omega0", "nan"], "omega0 = nan: must be"),
     (["analyze", "--psi", "-1"], "psi = -1.0: must be"),

@@ -110,7 +110,8 @@ def checked_number(
         If ``value`` is not a finite real number in the interval.
     """
     if isinstance(value, numbers.Real) and not isinstance(value, bool):
-        value = number = float(value)
+        # −0 is 0.
+        value = number = float(value) + 0.0
         if low <= number <= high and math.isfinite(number) and not (open_low and number == low):
             return number
     permitted = interval_text(low, high, open_low=open_low)

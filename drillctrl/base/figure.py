@@ -15,6 +15,7 @@ from drillctrl.base.files import replacing, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
@@ -30,6 +31,15 @@ STYLES = ("screen", "journal")
 def axis_name(quantity: str, unit: str = "") -> str:
     """Return the label of an axis or a colour bar: what is drawn, and in which unit."""
     return f"{quantity}, {unit or 'dimensionless'}"
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Write the numbers of a logarithmic axis as people do, with no powers of ten."""
+    from matplotlib.ticker import LogLocator
+
+    axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    for write in (axis.set_major_formatter, axis.set_minor_formatter):
+        write("{x:g}")
 
 
 def headline(text: str, columns: int = 64) -> str:

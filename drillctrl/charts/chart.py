@@ -17,7 +17,7 @@ from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
-from drillctrl.charts.sweep import FIRST_LINES, sweep
+from drillctrl.charts.sweep import sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
 from drillctrl.drilling.quantities import root_scales
@@ -25,7 +25,7 @@ from drillctrl.drilling.quantities import root_scales
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_STRINGS = 33
+_STRINGS, _NARROWEST = 33, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,8 +205,12 @@ def chart(
     held, scanned = (plane.y, plane.x) if rows else (plane.x, plane.y)
     start = first_position(held)
     # Every line at a depth has a string of its own, which costs.
-    first = _STRINGS if held.name == "depth" else FIRST_LINES
-    result = sweep(scanner, start, held.high, tolerance=tolerance, first=first)
+    if held.name == "depth":
+        result = sweep(
+            scanner, start, held.high, tolerance=tolerance, first=_STRINGS, narrowest=_NARROWEST
+        )
+    else:
+        result = sweep(scanner, start, held.high, tolerance=tolerance)
     curves = stable_curves(result.lines, rows=rows)
     regions = label_regions(plane, result.lines, level, rows=rows)
     # Nothing is known of the strip that holds no line.

@@ -233,15 +233,43 @@ class Plane:
     ) -> FloatArray:
         """Return groups and parameters of the bit's law at each place, (N, k)."""
         plant, point = self.case.physics("a chart of a string")
-        points = [point.with_changes(
-            **{name: float(v[i]) for name, v in own.items() if name in GROUP_NAMES}
-        ) for i in range(count)]  # fmt: skip
         if given:
-            points = [found.operating_point() for found in self._rig_points(given, count)]
-        rows = np.array([[getattr(p, name) for name in GROUP_NAMES] for p in points], dtype=float)
+            rows = self._rig_rows(given, count)
+        else:
+            base = [getattr(point, name) for name in GROUP_NAMES]
+            rows = np.tile(np.array(base, dtype=float), (count, 1))
+            for i, name in enumerate(GROUP_NAMES):
+                rows[:, i] = own.get(name, rows[:, i])
         law: dict[str, Any] = {**plant.bit.values, **own}
         more = [np.broadcast_to(law[name], count) for name in plant.bit.values]
         return np.column_stack([rows, *more])
+
+    def _rig_rows(self, given: dict[str, FloatArray], count: int) -> FloatArray:
+        """Return the groups of a rig at each place, (N, k)."""
+        moving = {"speed", "rop"} & set(given)
+        if "wob" in given:
+            moving = set()
+        held = np.column_stack([np.zeros(count), *(given[n] for n in given if n not in moving)])
+        first = where = np.zeros(count, dtype=np.intp)
+        if (held == held[:1]).all():
+            first = first[:1]
+        else:
+            _, first, where = np.unique(held, axis=0, return_index=True, return_inverse=True)
+        # Speed and rate move two groups alone: a point for each rig will do.
+        places = {name: v[first] for name, v in given.items()}
+        known = self._rig_points(places, first.size)
+        points = [one.operating_point() for one in known]
+        rows = np.array([[getattr(p, name) for name in GROUP_NAMES] for p in points], dtype=float)
+        rows, where = rows[where.ravel()], where.ravel()
+        si = {name: given[name] * to_si_factor(name, axis_language(self.case)) for name in moving}
+        speed = np.array([one.rotary_speed for one in known])[where]
+        rate = np.array([one.penetration_rate for one in known])[where]
+        speed, rate = si.get("speed", speed), si.get("rop", rate)
+        time = np.array([one.rig.time_scale for one in known])[where]
+        length = np.array([one.rig.axial_scale for one in known])[where]
+        rows[:, GROUP_NAMES.index("omega0")] = speed * time
+        rows[:, GROUP_NAMES.index("delta0")] = rate / speed / length
+        return rows
 
     def _bit_gains(
         self, structure: FeedbackStructure, values: dict[str, FloatArray], count: int

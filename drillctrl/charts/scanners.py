@@ -126,7 +126,7 @@ def _by_string(plane: Plane, scanned: Axis, scan: Any, *, rows: bool) -> Scanner
     # Frequencies of a chart are dimensionless, those of a string are not.
     known = string_at_bit(plane.case.physics("a chart")[0])
     assert known is not None
-    time = known.time_scale
+    time = known.scales[1]
 
     def scanner(positions: FloatArray) -> list[ScanLine]:
         strings, _ = find(positions, np.full(positions.size, high))

@@ -24,7 +24,6 @@ from drillctrl.drilling.bit_rock import BitRock
 from drillctrl.drilling.linear import bit_responses
 from drillctrl.strings.at_bit import StringAtBit
 from drillctrl.strings.exact import known_loop
-from drillctrl.strings.lump import lumped
 
 # What acts on a bit, and how it moves.
 EFFORTS, MOTIONS = ("axial", "torque"), ("x", "dx", "theta", "dtheta")
@@ -87,22 +86,12 @@ def si_loads(
         The string that the gains are dimensionless by.
     """
     now, then, delay = bit_responses(bit, rows)
-    scales = {id(string): _scales(string) for string in {id(s): s for s in strings}.values()}
-    scale = np.array([scales[id(string)][0] for string in strings])
-    time = np.array([scales[id(string)][1] for string in strings])
+    scale = np.array([string.scales[0] for string in strings])
+    time = np.array([string.scales[1] for string in strings])
     now, then = now * scale, then * scale
     if gains is not None:
-        now, then = now - gains[0] * _scales(units)[0], then - gains[1] * _scales(units)[0]
+        now, then = now - gains[0] * units.scales[0], then - gains[1] * units.scales[0]
     return BitLoads(now, then, delay * time)
-
-
-def _scales(string: StringAtBit) -> tuple[FloatArray, float]:
-    """Return the SI values of loads per state, (2, 4), and of a unit of time, s."""
-    unit = string.units or string.string
-    axial, torsional = lumped(unit, unit.tension), lumped(unit, unit.torsion)
-    time = math.sqrt(torsional.mass / torsional.stiffness)
-    efforts = np.array([axial.mass / time**2, torsional.stiffness])
-    return np.outer(efforts, [1.0, time, 1.0, time]), time
 
 
 def exact_count(string: StringAtBit, loads: BitLoads) -> int:
@@ -115,7 +104,7 @@ def exact_count(string: StringAtBit, loads: BitLoads) -> int:
     InputError
         If a root lies on the imaginary axis.
     """
-    scale, time = _scales(string)
+    scale, time = string.scales
     now, then = (part[0] / scale for part in loads[:2])
     loop = known_loop(string, now, then, float(loads.delay[0]) / time)
     return loop.count_right_of(0.0, 1.2 * time * _highest(string, (loads,)))

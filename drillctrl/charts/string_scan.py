@@ -31,7 +31,7 @@ _SHARE = 0.37
 # Crossings as far outside the line as it is long are not looked for.
 _MARGIN = 1.0
 _SAMPLES, _HALVINGS = 33, 4
-_TRIED, _STEPS, _NOTHING = 4, 8, 1e-6
+_TRIED, _STEPS, _NOTHING, _SHARP = 4, 8, 1e-6, 1e-9
 
 
 def is_affine(string: StringAtBit, start: BitLoads, middle: BitLoads, stop: BitLoads) -> bool:
@@ -147,5 +147,7 @@ def _newton(
         fine = np.isfinite(moved) & np.isfinite(risen)
         at, omega = at - np.where(fine, moved, 0.0), omega - np.where(fine, risen, 0.0)
         at, omega = np.clip(at, left - width, right + width), np.abs(omega)
+        if (np.abs(moved) <= _SHARP * width).all() and (np.abs(risen) <= _SHARP * omega).all():
+            break
     found = (np.abs(now) < _NOTHING) & (at >= left) & (at <= right)
     return at, omega, found

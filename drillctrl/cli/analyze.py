@@ -9,7 +9,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.bit_law import bit_law_options, read_bit_law
-from drillctrl.cli.drive_law import driven_case
+from drillctrl.cli.drive_law import driven_case, meant_structure
 from drillctrl.cli.drives import are_drives
 from drillctrl.cli.gains import read_gains, scales_at
 from drillctrl.cli.output import write_figure
@@ -29,8 +29,8 @@ from drillctrl.cli.verb import Verb
 @point_options
 @click.option(
     "--structure",
-    help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, observer-2, "
-    "dynamic-2 …; without it, the open loop.",
+    help="p, case1, pd, case2, or of a top drive: stiff (default there), soft-torque, z-torque, "
+    "observer-2, dynamic-2 …; without it, the open loop.",
 )
 @click.option(
     "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
@@ -68,6 +68,8 @@ def analyze_command(
 ) -> None:
     """Say whether given gains, or none, make a point stable, and by how much.
 
+    The top drive of a rig is stiff unless a law is named, or constant-torque.
+
     \b
     Examples:
       drillctrl analyze --omega0 10 --delta0 1.75 --psi 14
@@ -86,6 +88,7 @@ def analyze_command(
     from drillctrl.drilling.case import as_case
 
     law = read_bit_law(bit_law, drop, decay, where)
+    structure = meant_structure(where, structure, {"k1": k1, "k2": k2})
     if structure is not None and are_drives([structure]):
         turned = driven_case(where, structure, (k1, k2), tried, law)
         result = analyze(turned, m=m, order=order)

@@ -12,7 +12,7 @@ import click
 
 from drillctrl.base.errors import InputError
 from drillctrl.cli.axes import read_axis, with_axes
-from drillctrl.cli.drive_law import driven_case
+from drillctrl.cli.drive_law import driven_case, meant_structure
 from drillctrl.cli.drives import are_drives
 from drillctrl.cli.gains import Scales, read_bounds, read_gains, scales_at
 from drillctrl.cli.output import (
@@ -55,8 +55,8 @@ MESH_ENDINGS = (".vtk", ".ply", ".stl")
 )
 @click.option(
     "--structure",
-    help="p, case1, pd or case2, or of a top drive: stiff, soft-torque, z-torque, dynamic-2 …; "
-    "without it, the open loop.",
+    help="p, case1, pd or case2, or of a top drive: stiff (default there), soft-torque, "
+    "z-torque, dynamic-2 …; without it, the open loop.",
 )
 @click.option("--K1", "k1", metavar="GAINS", help="On the outputs, such as -5.03,-4.91.")
 @click.option("--K2", "k2", metavar="GAINS", help="On the delayed outputs.")
@@ -126,6 +126,8 @@ def chart_command(
     where = read_point(with_axes(point, *(axis for axis in (given_x, given_y) if axis)))
     usual = _usual_axes(where)
     x, y = given_x or usual[0], given_y or usual[1]
+    if not (optimise or bound):
+        structure = meant_structure(where, structure, {"k1": k1, "k2": k2})
     result: StabilityChart | StabilisableChart | StabilityVolume
     if structure is not None and are_drives([structure]):
         result = _of_drive(where, x, y, structure, (k1, k2), level, optimise or bound, z_axis)

@@ -59,6 +59,8 @@ def compare_command(
     plot: str | None,
     drop: str | None,
     decay: str | None,
+    objective: str | None,
+    keep: str | None,
     as_json: bool,
     out: str | None,
     **point: Any,
@@ -80,7 +82,7 @@ def compare_command(
     """
     check_folder("--out", out)
     names = [name for name in (part.strip() for part in structures.split(",")) if name]
-    for_drives = {"plot": plot, "drop": drop, "decay": decay}
+    for_drives = {"plot": plot, "drop": drop, "decay": decay, "objective": objective, "keep": keep}
     if are_drives(names):
         deliver_drives(names, point, for_drives, as_json, out, wants_trials(trials))
         return

@@ -6,7 +6,8 @@ from typing import Any
 
 import click
 
-from drillctrl.cli.drives import are_drives, deliver_drive_design
+from drillctrl.base.errors import InputError
+from drillctrl.cli.drives import are_drives, deliver_drive_design, keep_option
 from drillctrl.cli.gains import read_bounds, scales_at
 from drillctrl.cli.objective import (
     objective_options,
@@ -54,6 +55,7 @@ from drillctrl.cli.verb import Verb
 @trials_option("all")
 @surroundings_options
 @click.option("--workers", type=int, default=1, show_default=True, help="Processes (drilling).")
+@keep_option()
 @root_output_options
 def design_command(
     structure: str,
@@ -88,6 +90,8 @@ def design_command(
         if require_stable and not stable:
             raise click.exceptions.Exit(NOT_STABILISED)
         return
+    if (keep := options.pop("keep")) is not None:
+        raise InputError("--keep", keep, "left out unless laws of a top drive are designed")
     objective, requirements = read_objective(options), read_requirements(options)
     surroundings = {name: options.pop(name) for name in SURROUNDINGS}
     where = read_point(options)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from drillctrl.base.errors import InputError
 from drillctrl.cli.gains import gain_scales, read_gains
 from drillctrl.cli.verb import naming
@@ -25,6 +27,39 @@ _NOT_DRIVEN = {
     "rate_limit": None,
     "noise": "",
 }
+
+
+def meant_structure(
+    where: OperatingPoint | RigPoint, structure: str | None, options: Mapping[str, Any]
+) -> str | None:
+    """Return the structure that is meant: the top drive of a rig is stiff where none was typed.
+
+    It is said that it is. None where nothing closes the loop: without a top drive, with torque
+    that was asked to be constant, or where another option asks for a structure.
+
+    Raises
+    ------
+    InputError
+        If there is no top drive whose torque could be constant.
+    """
+    from drillctrl.drilling.drive import CONSTANT_TORQUE
+    from drillctrl.drilling.point import RigPoint
+    from drillctrl.strings.drives import machine_of
+    from drillctrl.strings.rig import StringRig
+
+    rig = where.rig if isinstance(where, RigPoint) else None
+    if structure == CONSTANT_TORQUE:
+        if rig is None:
+            raise InputError("--structure", structure, "used with --rig: it turns a string")
+        machine_of(rig)
+        return None
+    unasked = {"k1": None, "k2": None, **_NOT_DRIVEN}
+    typed = any(options.get(name, usual) != usual for name, usual in unasked.items())
+    if structure is not None or typed or not isinstance(rig, StringRig) or rig.drive is None:
+        return structure
+    instead = f"--structure {CONSTANT_TORQUE} leaves its torque as it is"
+    click.echo(f"drillctrl: note: the top drive is stiff, as no law was given; {instead}", err=True)
+    return "stiff"
 
 
 def driven_case(

@@ -22,13 +22,15 @@ from drillctrl.cli.output import (
 from drillctrl.cli.point import read_point, rig_name
 
 if TYPE_CHECKING:
+    from drillctrl.designs.drilling import Drilling
     from drillctrl.strings.drive_table import DriveTable
     from drillctrl.strings.drives import DriveComparison
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 ENDINGS = (".csv", ".json")
-_ALONE = ("plot", "drop", "decay")
+_ALONE = ("plot", "drop", "decay", "objective", "keep")
+_DRILLING = ("objective", "kick", "modes", "keep")
 _POINT = ("rig", "speed", "rop", "wob", "rock_strength")
 _BEARS = (*_POINT, "trials", "units", "structures", "as_json", "out", *_ALONE)
 _TABLE_BEARS = ("rig", "units", "depth", "structure", "require_stable", "as_json", "out", "plot")
@@ -42,10 +44,45 @@ def drive_options(command: Command) -> Command:
         click.option("--plot", type=click.Path(), help="Draw drives: FILE.png, .svg, .pdf."),
         click.option("--drop", help="Drives: torque that falls as the bit turns faster [2 kN*m]."),
         click.option("--decay", help="Drives: speed over which it falls [5 rad/s]."),
+        click.option(
+            "--objective",
+            help="Drives: drilling tunes laws to what the bit does at the point, as in design.",
+        ),
+        keep_option(),
     ]
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def keep_option() -> Callable[[Command], Command]:
+    """Return the option that says where measurements of the bit are kept."""
+    return click.option(
+        "--keep",
+        type=click.Path(file_okay=False),
+        metavar="FOLDER",
+        help="Drives, drilling: keep what the bit does here, and take it from here.",
+    )
+
+
+def _drilling(options: Mapping[str, Any]) -> Drilling | None:
+    """Return the objective of laws of a drive; None for the string alone.
+
+    Raises
+    ------
+    InputError
+        If it is another.
+    """
+    from drillctrl.designs.drilling import Drilling
+
+    if options["objective"] is None:
+        return None
+    if options["objective"] != "drilling":
+        wanted = "drilling, or left out: laws of a top drive have no other"
+        raise InputError("--objective", options["objective"], wanted)
+    given = {name: options.get(name) for name in ("kick", "modes")}
+    known = {name: value for name, value in given.items() if value is not None}
+    return Drilling(**{"modes": 4, **known})
 
 
 def are_drives(names: Sequence[str]) -> bool:
@@ -99,7 +136,7 @@ def deliver_drive_design(
     Returns
     -------
     bool
-        Whether it is stable and recommended.
+        Whether it is stable and not refused.
 
     Raises
     ------
@@ -107,7 +144,9 @@ def deliver_drive_design(
         If an option is missing, wrong, or one that does not bear on drives.
     """
     dynamic = structure.startswith("dynamic-")
-    _refuse_others(structure, (*_DESIGN_BEARS, *(["depth_error"] if dynamic else [])))
+    objective = _drilling(point)
+    own = (*(["depth_error"] if dynamic else []), *(_DRILLING if objective else ()))
+    _refuse_others(structure, (*_DESIGN_BEARS, *own))
     if point.get("rig") is None:
         raise InputError("--rig", "(missing)", "given: drives turn a string")
     from drillctrl.designs.drive_design import design_drive
@@ -120,14 +159,16 @@ def deliver_drive_design(
         where,
         structure,
         length_error=0.2 if error is None else error,
+        objective=objective,
         trials=drills and trials,
         workers=workers,
+        keep=point.get("keep"),
     )
     units = point.get("units") or "si"
     text = functools.partial(found.summary, units)
     draw = functools.partial(found.plot, rig_name(point))
     deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
-    return found.stable and found.recommended
+    return found.stable and found.recommended is not False
 
 
 def _refuse_others(structure: str, bears: Sequence[str]) -> None:
@@ -223,7 +264,7 @@ def deliver_drives(
         Options that say where the rig drills; drives need ``rig`` alone, and are tried where there
         is more.
     given : mapping
-        ``plot``, ``drop`` and ``decay``.
+        The options of `drive_options`.
     as_json : bool
         Whether to print JSON.
     out : str or None
@@ -243,9 +284,11 @@ def deliver_drives(
     if point.get("rig") is None:
         raise InputError("--rig", "(missing)", "given: drives turn a string")
     from drillctrl.base import units
-    from drillctrl.strings.drives import compare_drives
+    from drillctrl.base.language import told_language
+    from drillctrl.strings.drives import compare_drives, drive_control, machine_of
     from drillctrl.strings.falling import FallingTorque
     from drillctrl.strings.files import load_rig
+    from drillctrl.strings.rig import StringRig
 
     falling = {}
     for name, dimension in (("drop", units.TORQUE), ("decay", units.ROTARY_SPEED)):
@@ -254,7 +297,19 @@ def deliver_drives(
     drills = any(point.get(name) is not None for name in _POINT[1:])
     where: Any = read_point(dict(point)) if drills else None
     rig = where.rig if drills else load_rig(point["rig"])
-    found = compare_drives(rig, names, FallingTorque(**falling))
+    objective, bit, best = _drilling(given), None, None
+    if objective is None:
+        found = compare_drives(rig, names, FallingTorque(**falling))
+    elif not drills:
+        raise InputError("--objective", objective.name, "used at a point: --speed and --rop")
+    else:
+        from drillctrl.designs.drive_load import bit_load
+
+        machine_of(rig)
+        assert isinstance(rig, StringRig)
+        bit = bit_load(where, objective, keep=given["keep"])
+        laws = [drive_control(name, rig, bit=bit) for name in names]
+        found = compare_drives(rig, laws, FallingTorque(**falling))
     fields, text = found.to_dict(), found.summary(point.get("units") or "si")
     if drills and trials:
         from drillctrl.designs.drive_trials import best_tried, drive_trials, trials_text
@@ -262,10 +317,18 @@ def deliver_drives(
 
         tried = drive_trials(where, found.drives)
         fields["trials"] = [each.to_dict() for each in tried]
-        fields["best"] = best_tried(tried).drive.control.name
+        best = best_tried(tried)
+        fields["best"] = best.drive.control.name
         # What runs bore out stands first, in place of what the string alone advises.
         _, table = text.split("\n\n", 1)
         text = f"{trials_text(tried, as_case(where).place)}\n\n{table}"
+    if bit is not None:
+        from drillctrl.designs.drive_motion import drive_motion
+
+        drives = found.drives if best is None else (best.drive, *found.drives)
+        motion = drive_motion(where, bit, drives, best)
+        fields["on_motion"] = motion.to_dict()
+        text += "\n\n" + motion.text(told_language(point.get("units") or "si"))
     _write(found, out, fields)
     if given["plot"] is not None:
         write_figure(given["plot"], found.plot(rig_name(point)))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from drillctrl.base.errors import InputError
-from drillctrl.cli.quantity import read_quantity
+from drillctrl.cli.quantity import put_once, read_quantity
 
 if TYPE_CHECKING:
     from drillctrl.delay.structure import FeedbackStructure
@@ -95,7 +95,7 @@ def read_bounds(
     InputError
         If a text has not that form, or a bound has no unit where a rig is given.
     """
-    bounds = {}
+    bounds: dict[str, tuple[float, float]] = {}
     for text in texts:
         name, _, interval = text.partition("=")
         low, _, high = (part.strip() for part in interval.partition(":"))
@@ -104,12 +104,13 @@ def read_bounds(
             _, _, unit = high.partition(" ")
             if unit and " " not in low:
                 low = f"{low} {unit}"
-            bounds[name.strip()] = (_gain("--bound", low, scale), _gain("--bound", high, scale))
-            continue
-        try:
-            bounds[name.strip()] = (float(low), float(high))
-        except ValueError:
-            raise InputError("--bound", text, "of the form K1=-10:10") from None
+            ends = _gain("--bound", low, scale), _gain("--bound", high, scale)
+        else:
+            try:
+                ends = float(low), float(high)
+            except ValueError:
+                raise InputError("--bound", text, "of the form K1=-10:10") from None
+        put_once("--bound", bounds, name.strip(), ends)
     return bounds
 
 

@@ -75,7 +75,8 @@ _COUNTS = (15, 12)
 @click.option(
     "--threshold",
     is_flag=True,
-    help="Also where torsion loses its damping on the motion drilled with: some minutes more.",
+    help="Also where torsion loses its damping on the motion drilled with: some minutes more; "
+    "not of a string under a top drive.",
 )
 @click.option(
     "--starts",

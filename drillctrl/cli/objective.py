@@ -35,9 +35,9 @@ def objective_options(command: Command) -> Command:
         click.option(
             "--objective",
             help="exact: α; drilling: growth of torsional swings on the motion that is drilled "
-            "with; semidiscrete: ρ(D); worst-case: largest α when the point is off; robust: "
-            "largest Re s when the plant's matrices are off. Without it exact, and drilling where "
-            "that does not stabilise.",
+            "with (laws of a top drive: the bit is shaken least); semidiscrete: ρ(D); worst-case: "
+            "largest α when the point is off; robust: largest Re s when the plant's matrices are "
+            "off. Without it exact, and drilling where that does not stabilise.",
         ),
         click.option("--m", type=int, help="Intervals (semidiscrete; default 40)."),
         click.option("--order", type=int, help="0, 1 or 2 (semidiscrete; default 0)."),
@@ -56,7 +56,7 @@ def objective_options(command: Command) -> Command:
         ),
         click.option("--epsilon", type=float, help="Relative error (robust; default 0.001)."),
         click.option("--kick", type=float, help="Largest swing of the speed (drilling; 0.45)."),
-        click.option("--modes", type=int, help="Torsional modes (drilling; default 1)."),
+        click.option("--modes", type=int, help="Torsional modes (drilling; 1, of a top drive 4)."),
     ]
     return with_options(command, options)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -51,3 +51,16 @@ def read_quantity(
         return bare * unit
     both = f"'{text} {dimension.unit}', or '{bare * unit:.6g} {dimension.unit}'"
     raise InputError(option, text, f"given with its unit: {both} for the dimensionless {text}")
+
+
+def put_once(option: str, into: dict[str, Any], name: str, value: Any) -> None:
+    """Keep a value by its name, which may be typed once.
+
+    Raises
+    ------
+    InputError
+        If it has been typed before: neither value is the one that is meant.
+    """
+    if name in into:
+        raise InputError(option, name, "given once: it is there twice")
+    into[name] = value

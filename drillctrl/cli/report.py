@@ -24,7 +24,9 @@ from drillctrl.cli.verb import Verb, naming
 )
 @click.option("--no-map", is_flag=True, help="Leave out the map, which takes longest.")
 @click.option(
-    "--date", default=None, help="Printed on it; else that of SOURCE_DATE_EPOCH, else none."
+    "--date",
+    default=None,
+    help="Printed on it: any text, or today; else that of SOURCE_DATE_EPOCH, else none.",
 )
 @click.option("--workers", type=int, default=2, show_default=True, help="Processes.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object (SI) instead.")
@@ -46,7 +48,8 @@ def report_command(
 
     \b
     Examples:
-      drillctrl report --rig table1 --speed "150 rpm" --rop "20 m/h" --no-map --out report.html
+      drillctrl report --rig table1 --speed "150 rpm" --rop "20 m/h" --no-map \\
+          --date today --out report.html
       drillctrl report --rig table1 --speed "150 rpm" --rop "65 ft/h" --structure p --no-map \\
           --units field --date 2026-11-29 --out report.html
 
@@ -88,7 +91,8 @@ def report_command(
 def _date(given: str | None) -> str:
     """Return the date of a report: as given, or of a build that is to be repeated."""
     if given is not None:
-        return given
+        # Whoever types it wants another page tomorrow.
+        return datetime.now().astimezone().date().isoformat() if given == "today" else given
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     if not epoch.isdecimal():
         return ""

@@ -9,7 +9,7 @@ import click
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.cli.gains import read_gains, scales_at
-from drillctrl.cli.quantity import read_quantity
+from drillctrl.cli.quantity import put_once, read_quantity
 from drillctrl.cli.verb import Command, with_options
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ def controller_options(command: Command) -> Command:
     options = [
         click.option(
             "--structure",
-            help="p, case1, pd, case2, or of a top drive: stiff, soft-torque, z-torque, "
-            "dynamic-2 …; without it, no control.",
+            help="p, case1, pd, case2, or of a top drive: stiff (default there), soft-torque, "
+            "z-torque, dynamic-2 …; without it, no control.",
         ),
         click.option(
             "--K1", "k1", metavar="GAINS", help="On the outputs: -5,-4; with a rig '-3 kN*m/rad'."
@@ -76,13 +76,14 @@ def controller_options(command: Command) -> Command:
 
 def read_numbers(option: str, text: str, example: str) -> dict[str, float]:
     """Return numbers by name from a text such as ``dx=1,dtheta=1``; empty for none."""
-    numbers = {}
+    numbers: dict[str, float] = {}
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, _, value = part.partition("=")
         try:
-            numbers[name.strip()] = float(value)
+            number = float(value)
         except ValueError:
             raise InputError(option, text, f"of the form {example}") from None
+        put_once(option, numbers, name.strip(), number)
     return numbers
 
 
@@ -103,7 +104,7 @@ def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[s
         ("dx", "axial_rate", units.SPEED),
         ("x", "length", units.LENGTH),
     )
-    numbers = {}
+    numbers: dict[str, float] = {}
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals:
@@ -112,7 +113,7 @@ def read_states(option: str, text: str, example: str, rig: Rig | None) -> dict[s
             if name.startswith(start):
                 unit = si_scale(quantity, rig)
                 typed = read_quantity(f"{option} {name}", value, dimension, unit, noted=True)
-                numbers[name] = typed / unit
+                put_once(option, numbers, name, typed / unit)
                 break
         else:
             raise InputError(option, text, "of states x, dx, theta, dtheta")

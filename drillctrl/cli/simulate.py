@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from drillctrl.base.errors import InputError, checked_number
-from drillctrl.cli.drive_law import driven_run
+from drillctrl.cli.drive_law import driven_run, meant_structure
 from drillctrl.cli.drives import are_drives
 from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
 from drillctrl.cli.output import check_figure, check_folder
@@ -111,6 +111,8 @@ def simulate_command(
 ) -> None:
     """Try gains, or none, on the nonlinear drill string: stick, slip and bounce.
 
+    The top drive of a rig is stiff unless a law is named, or constant-torque.
+
     \b
     Examples:
       drillctrl simulate --omega0 10 --delta0 2.5 --psi 14 --duration 200 --plot motion.png
@@ -145,6 +147,7 @@ def simulate_command(
             if given:
                 raise InputError(option, "given", "left out where there is --starts")
     scenario = read_scenario(start, initial, change, groups, rig)
+    options["structure"] = meant_structure(where, options["structure"], options)
     place: Any = where
     checked: Any = groups
     controller: Controller | None

@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.text import wrapped
+from drillctrl.designs.drilling import Drilling
+from drillctrl.designs.drive_load import bit_load
+from drillctrl.designs.drive_motion import DriveMotion, drive_motion
 from drillctrl.designs.drive_trials import DriveTrials, best_tried, drive_trials, trials_text
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
@@ -17,7 +22,14 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drive_tuned import TUNED
-from drillctrl.strings.drives import DriveComparison, compare_drives, drive_control, machine_of
+from drillctrl.strings.drive_verdict import UNTRIED
+from drillctrl.strings.drives import (
+    ON_LOAD,
+    DriveComparison,
+    compare_drives,
+    drive_control,
+    machine_of,
+)
 from drillctrl.strings.drives_words import refusal, setting_sentence
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.named_roots import NamedRoots, named_roots
@@ -45,6 +57,9 @@ class DriveDesign:
         The law that was asked for; that of ``drive`` where another does better in trial runs.
     trials : tuple of DriveTrials
         What trial runs showed of the laws of ``found``; empty where none were made.
+    motion : DriveMotion or None
+        What was measured of the motion that is drilled with; None where laws were designed for
+        the string alone.
     elapsed_seconds : float
         Wall time.
     """
@@ -54,6 +69,7 @@ class DriveDesign:
     modes: NamedRoots | None
     asked: str
     trials: tuple[DriveTrials, ...]
+    motion: DriveMotion | None
     elapsed_seconds: float
 
     @property
@@ -67,14 +83,20 @@ class DriveDesign:
         return self.drive.stable and (self.drilling is None or self.drilling.stable)
 
     @property
-    def recommended(self) -> bool:
-        """Whether the law does its string no harm, and none in trial runs where these were made."""
-        return self.drive.verdict.recommended and not (self.trials and self.trials[0].verdict.harm)
+    def recommended(self) -> bool | None:
+        """Whether the law does no harm in trial runs; None where it was not tried.
+
+        False too where it does its string harm, whatever the bit does.
+        """
+        verdict = self.drive.verdict
+        return not self.trials[0].verdict.harm if self.trials else verdict.untried
 
     @property
     def reason(self) -> str:
         """One sentence why."""
-        return self.trials[0].verdict.reason if self.trials else self.drive.verdict.reason()
+        if self.trials:
+            return self.trials[0].verdict.reason
+        return self.drive.verdict.untried_reason()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -101,6 +123,8 @@ class DriveDesign:
             "recommended": self.recommended,
             "reason": self.reason,
             "asked": self.asked,
+            "objective": "critical-slope" if self.motion is None else "drilling",
+            "on_motion": self.motion and self.motion.to_dict(),
             "trials": [each.to_dict() for each in self.trials],
             "drilling": drilling,
             "elapsed_seconds": self.elapsed_seconds,
@@ -112,6 +136,8 @@ class DriveDesign:
         first = setting_sentence(self.drive.control, language)
         if not self.drive.verdict.recommended:
             first = refusal(self.drive, language)
+        elif self.recommended is None:
+            first += f" It was {UNTRIED}: runs need a speed and a feed."
         elif not self.recommended:
             first = f"Refused: {self.drive.control.name}, {self.reason}."
         elif self.asked != self.drive.control.name:
@@ -126,6 +152,8 @@ class DriveDesign:
                 lines += [f"  {text}" for _, text in self.modes.lines]
         if self.trials and self.drilling is not None:
             lines += ["", trials_text(self.trials, self.drilling.case.place)]
+        if self.motion is not None:
+            lines += ["", self.motion.text(language)]
         return "\n".join(lines)
 
     def _outcome(self, said: Analysis) -> str:
@@ -150,8 +178,10 @@ def design_drive(
     falling: FallingTorque | None = None,
     *,
     length_error: float = 0.2,
+    objective: Drilling | None = None,
     trials: bool = False,
     workers: int = 1,
+    keep: str | Path | None = None,
 ) -> DriveDesign:
     """Find the law of a top drive, by the rule of its name or by optimisation.
 
@@ -167,12 +197,17 @@ def design_drive(
     length_error : float
         Share by which the string may be shorter and longer: what is optimised holds the
         smallest critical slope of all of these up.
+    objective : Drilling, optional
+        At a point, laws are those under which the bit swings least there: by what it answers and
+        by how it shakes the string, measured in a minute or two; see `bit_load`.
     trials : bool
         At a point, whether laws are run from a small start and from kicks beside a stiff drive:
         the one asked for and, beside an optimised one, ``"z-torque"`` by its rule and tuned. The
         best of these is the answer.
     workers : int
         Processes that share the runs.
+    keep : str or Path, optional
+        A folder in which what was measured of the bit is kept, and looked for.
 
     Returns
     -------
@@ -188,16 +223,27 @@ def design_drive(
     rig = where.rig if isinstance(where, RigPoint) else where
     machine_of(rig)
     assert isinstance(rig, StringRig)
-    names = [structure]
+    bit = None
+    if objective is not None:
+        if not isinstance(where, RigPoint):
+            raise InputError("objective", objective.name, "used at a point: speed and feed")
+        if structure not in ON_LOAD:
+            wanted = f"used with {', '.join(ON_LOAD)}: {structure} has nothing to tune"
+            raise InputError("objective", objective.name, wanted)
+        bit = bit_load(where, objective, workers=workers, keep=keep)
+    laws = [drive_control(structure, rig, length_error, bit)]
     if trials and isinstance(where, RigPoint) and structure.startswith("dynamic-"):
-        names += [TUNED, "z-torque"]
-    found = compare_drives(rig, [drive_control(name, rig, length_error) for name in names], falling)
+        laws += [drive_control(TUNED, rig, length_error, bit), drive_control("z-torque", rig)]
+    found = compare_drives(rig, laws, falling)
     tried: tuple[DriveTrials, ...] = ()
     if trials and isinstance(where, RigPoint):
         tried = drive_trials(where, found.drives, workers)
         best = best_tried(tried)
         tried = (best, *(each for each in tried if each is not best))
         found = replace(found, drives=tuple(each.drive for each in tried))
+    motion = None
+    if bit is not None and isinstance(where, RigPoint):
+        motion = drive_motion(where, bit, found.drives, tried[0] if tried else None)
     drilling = modes = None
     if isinstance(where, RigPoint):
         # Half of a second to load, and a law without a point has no use for it.
@@ -206,4 +252,6 @@ def design_drive(
         case = as_case(where, driven_plant(rig, found.drives[0].control))
         drilling = analyze(case)
         modes = named_roots(case, None, drilling.K1, drilling.K2)
-    return DriveDesign(found, drilling, modes, structure, tried, time.perf_counter() - began)
+    return DriveDesign(
+        found, drilling, modes, structure, tried, motion, time.perf_counter() - began
+    )

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.base.text import wrapped
+from drillctrl.base.text import WIDTH, wrapped
 from drillctrl.base.workers import open_executor, spread_out
-from drillctrl.designs.trials import STARTS, Trial
-from drillctrl.designs.verdict import Verdict, judge
+from drillctrl.designs.trials import STARTS, Trial, standing_starts
+from drillctrl.designs.verdict import FAILURES, Verdict, judge, with_engagement
 from drillctrl.drilling.point import RigPoint
 from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.outcome import Figures, figures
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.starts import Start
+from drillctrl.simulation.status import Outcome
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drive_rules import stiff_control
@@ -28,13 +29,8 @@ _PERIODS = 14.0
 _RTOL, _STEPS = 1e-5, 1_000_000
 # Swings that are alike, of which the law that stands more is better.
 _ALIKE = 0.02
-_WORDS = (
-    ("with these gains", "with this law"),
-    ("without control", "under a stiff drive"),
-    ("they do not settle it", "it does not bring the motion to rest"),
-    ("they do not stabilise smooth drilling", "smooth drilling is not stable"),
-    ("and do no", "and it does no"),
-)
+_BESIDE = "under a stiff drive"
+_STANDING = "bring a bit that stands up to speed under the stiff drive"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +53,23 @@ class DriveTrials:
         """Whether the law can be recommended; a stiff drive is what others are compared with."""
         if not self.drive.verdict.recommended:
             return Verdict(False, self.drive.verdict.reason(), self.trials, True)
-        found = judge(self.trials, True)
-        reason = found.reason
-        for of_gains, of_laws in _WORDS:
-            reason = reason.replace(of_gains, of_laws)
-        return Verdict(found.recommended, reason, self.trials, found.harm)
+        return with_engagement(judge(self.moving, True), self.trials[len(self.moving) :], _STANDING)
+
+    @property
+    def moving(self) -> tuple[Trial, ...]:
+        """Those in which the bit turns at first."""
+        return tuple(trial for trial in self.trials if trial.start.begin == "steady")
 
     @property
     def swing(self) -> float:
-        """The largest swing of any start; infinite where a run broke off or the bit stood still."""
-        swings = [trial.controlled.swing for trial in self.trials]
+        """The largest swing of those; infinite where a run broke off or the bit stood still."""
+        swings = [trial.controlled.swing for trial in self.moving]
         return max(np.inf if swing is None else swing for swing in swings)
 
     @property
     def worst(self) -> Figures:
         """What became of the worst start."""
-        ends = [trial.controlled for trial in self.trials]
+        ends = [trial.controlled for trial in self.moving]
         return max(ends, key=lambda end: (end.outcome.severity, end.swing or 0.0))
 
     def to_dict(self) -> dict[str, Any]:
@@ -90,7 +87,7 @@ class DriveTrials:
 def drive_trials(
     where: RigPoint, drives: Sequence[DriveMeasures], workers: int = 1
 ) -> tuple[DriveTrials, ...]:
-    """Try laws of a drive from a small start and from kicks, each beside a stiff drive.
+    """Try laws of a drive from a small start, from kicks, and out of a stick, beside a stiff drive.
 
     Parameters
     ----------
@@ -100,6 +97,12 @@ def drive_trials(
         The laws; delay, lag and torque limit of their machine hold in the runs.
     workers : int
         Processes.
+
+    Returns
+    -------
+    tuple of DriveTrials
+        In the same order. A law under which the bit turns back or diverges is tried from no more
+        starts; out of a stick the best alone is.
 
     Raises
     ------
@@ -111,22 +114,40 @@ def drive_trials(
     controls = [drive.control for drive in drives]
     stiff = stiff_control(controls[0].machine, rig.string.torsion.wave_impedance)
     seconds = _PERIODS / drives[0].modes[0].slope.mode_frequency
-    laws = [stiff, *(control for control in controls if control != stiff)]
-    tasks = [(where, law, start, seconds) for law in laws for start in STARTS]
+    trials: list[list[Trial]] = [[] for _ in drives]
     with open_executor(workers, None) as executor:
-        indexed = list(enumerate(tasks))
-        found = dict(spread_out(executor, _run, indexed))
-    ends = {(law, start.name): found[i] for i, (_, law, start, _) in indexed}
-    return tuple(
-        DriveTrials(
-            drive,
-            tuple(
-                Trial(start, ends[drive.control, start.name], ends[stiff, start.name])
-                for start in STARTS
-            ),
-        )
-        for drive in drives
-    )
+
+        def run(start: Start, places: Sequence[int]) -> None:
+            laws = [stiff, *(controls[i] for i in places if controls[i] != stiff)]
+            tasks = list(enumerate((where, law, start, seconds) for law in laws))
+            ends = dict(spread_out(executor, _run, tasks))
+            for i in places:
+                mine = ends[laws.index(controls[i])]
+                trials[i].append(Trial(start, mine, ends[0], _BESIDE))
+
+        for start in STARTS:
+            if alive := [i for i, made in enumerate(trials) if not any(map(_broke, made))]:
+                run(start, alive)
+        made = [DriveTrials(d, tuple(t)) for d, t in zip(drives, trials, strict=True)]
+        best = made.index(best_tried(made))
+        if not made[best].verdict.refused:
+            for start in standing_starts(law_controller(where, controls[best])[0]):
+                run(start, [best])
+    return tuple(DriveTrials(d, tuple(t)) for d, t in zip(drives, trials, strict=True))
+
+
+def _broke(trial: Trial) -> bool:
+    return trial.controlled.outcome in (Outcome.TURNS_BACK, Outcome.DIVERGES)
+
+
+def law_is_quiet(where: RigPoint, drive: DriveMeasures, most: float) -> bool:
+    """Whether under a law the bit swings by no more than that from a small start and a kick."""
+    seconds = _PERIODS / drive.modes[0].slope.mode_frequency
+    for start in STARTS[:2]:
+        _, end = _run((0, (where, drive.control, start, seconds)))
+        if end.swing is None or end.outcome in FAILURES or end.swing > most:
+            return False
+    return True
 
 
 def _run(task: tuple[int, tuple[RigPoint, DriveControl, Start, float]]) -> tuple[int, Figures]:
@@ -147,14 +168,21 @@ def _run(task: tuple[int, tuple[RigPoint, DriveControl, Start, float]]) -> tuple
 
 def trials_text(found: Sequence[DriveTrials], place: str) -> str:
     """Return a table of what became of the starts under each law, and which does best."""
-    width = max(len("swing of the bit"), *(len(each.drive.control.name) for each in found)) + 2
-    rows = [("swing of the bit", [start.name for start in STARTS])]
-    rows.append(("a stiff drive", [_cell(trial.uncontrolled) for trial in found[0].trials]))
+    starts = list({t.start.name: t.start for each in found for t in each.trials}.values())
+    rows = [("swing of the bit", [start.name for start in starts])]
+    ends = {t.start.name: t.uncontrolled for each in found for t in each.trials}
+    rows.append(("a stiff drive", [_cell(ends[start.name]) for start in starts]))
     for each in found:
-        rows.append((each.drive.control.name, [_cell(trial.controlled) for trial in each.trials]))
+        mine = {trial.start.name: trial.controlled for trial in each.trials}
+        rows.append((each.drive.control.name, [_cell(mine.get(s.name)) for s in starts]))
+    width = max(len(name) for name, _ in rows) + 2
     lines = [wrapped(f"Trial runs at {place}")]
-    lines += [f"{name:<{width}}{''.join(f'{cell:<20}' for cell in cells)}".rstrip()
-              for name, cells in rows]  # fmt: skip
+    columns = max(len(cell) for _, cells in rows for cell in cells) + 2
+    abreast = (WIDTH - width) // columns
+    for begin in range(0, len(starts), abreast):
+        for name, cells in rows:
+            beside = "".join(f"{cell:<{columns}}" for cell in cells[begin : begin + abreast])
+            lines.append(f"{name:<{width}}{beside}".rstrip())
     for each in found:
         if each.verdict.refused:
             word = "Refused" if each.verdict.harm else "No better"
@@ -166,7 +194,8 @@ def trials_text(found: Sequence[DriveTrials], place: str) -> str:
 
 
 def _cell(end: Figures | None) -> str:
-    assert end is not None
+    if end is None:
+        return "not run"
     swing = "" if end.swing is None else f"{end.swing:.2f} "
     return f"{swing}{end.outcome}"
 

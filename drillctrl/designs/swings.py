@@ -24,7 +24,7 @@ from drillctrl.synthesis.descent import Objective
 from drillctrl.synthesis.family import LoopFamily, loop_family
 
 # Errors of H, over the torque per speed of the string, with which nothing is designed.
-_UNKNOWN = 0.25
+UNKNOWN = 0.25
 # Cost of gains on their bounds, over the largest of these.
 _EFFORT = 0.01
 
@@ -65,7 +65,7 @@ class Swing:
     @property
     def known(self) -> bool:
         """Whether H is known well enough to design with."""
-        return self.error < _UNKNOWN
+        return self.error < UNKNOWN
 
     @property
     def answers(self) -> tuple[complex, ...]:

@@ -64,11 +64,14 @@ class Trial:
         With the gains.
     uncontrolled : Figures or None
         Without; None where nothing depended on it.
+    beside : str
+        What that is, in words.
     """
 
     start: Start
     controlled: Figures
     uncontrolled: Figures | None
+    beside: str = "without control"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields."""

@@ -136,10 +136,10 @@ def judge(
     if not settled and good is None and quiet and growth is not None and _decays(*growth):
         return Verdict(True, _sooner(*growth), runs)
     if not settled and good is None:
-        what = "they do not settle it" if stable else "they do not stabilise smooth drilling"
-        return Verdict(False, f"{what}, and do no measurable good: {_beside(runs[0])}", runs)
+        what = "the motion does not settle" if stable else "smooth drilling is not stable"
+        return Verdict(False, f"{what}, with no measurable good: {_beside(runs[0])}", runs)
     if len(settled) == len(runs):
-        return Verdict(True, f"with these gains the motion settles from {starts_text(runs)}", runs)
+        return Verdict(True, f"the motion settles from {starts_text(runs)}", runs)
     if not settled:
         return Verdict(True, f"smooth drilling is not reached, but {good}{_but(runs)}", runs)
     rest = next(trial for trial in runs if trial not in settled)
@@ -200,7 +200,7 @@ def _beside(trial: Trial) -> str:
     """Say what a start led to, with the gains and without."""
     mine, free = trial.controlled, trial.uncontrolled
     text = f"after {trial.start.text} {_what(mine)}"
-    return text if free is None else f"{text}; without control {_what(free)}"
+    return text if free is None else f"{text}; {trial.beside} {_what(free)}"
 
 
 def _what(found: Figures) -> str:
@@ -234,7 +234,7 @@ def _harm(trial: Trial) -> str | None:
         return _beside(trial)
     after = f"after {trial.start.text}"
     if _more(mine.swing, free.swing, _SWING):
-        return f"{after} the bit swings more than without control: {_swing(mine, free)}"
+        return f"{after} the bit swings more than {trial.beside}: {_swing(mine, free)}"
     if _more(mine.stick_fraction, free.stick_fraction, _STUCK):
         shares = _percent(mine.stick_fraction, free.stick_fraction)
         return f"{after} the bit sticks for {shares} of the time"
@@ -255,7 +255,7 @@ def _good(trial: Trial) -> str | None:
         return _beside(trial)
     slips = mine.outcome == Outcome.STICK_SLIP and not _more(free.swing, mine.swing, _HALF)
     if _more(free.swing, mine.swing, _SWING) and not slips:
-        return f"{after} the bit swings less than without control: {_swing(mine, free)}"
+        return f"{after} the bit swings less than {trial.beside}: {_swing(mine, free)}"
     if _more(free.stick_fraction, mine.stick_fraction, _STUCK):
         shares = _percent(mine.stick_fraction, free.stick_fraction)
         return f"{after} the bit sticks for {shares} of the time"

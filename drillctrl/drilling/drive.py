@@ -15,6 +15,9 @@ from drillctrl.drilling.block import Block
 from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.string import TOP, String
 
+# What a drive gives that no law turns.
+CONSTANT_TORQUE = "constant-torque"
+
 
 class TopDrive(Block):
     """A drive: J I φ'' is the torque of the string on it plus the drive's.

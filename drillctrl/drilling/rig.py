@@ -171,7 +171,8 @@ def read_toml(source: str | Path, permitted: str) -> dict[str, Any]:
     path = Path(source)
     try:
         check_regular(path, _MOST_BYTES)
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        # Some editors begin a file with a mark of its encoding.
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
         raise InputError("rig", str(source), f"{permitted} ({reason})") from None

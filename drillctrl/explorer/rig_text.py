@@ -119,7 +119,7 @@ def rig_as_text(source: str) -> str:
     if isinstance(rig, StringRig) and isinstance(data.get("sections"), str):
         data["sections"] = [section_texts(section) for section in rig.string.sections]
         return tomli_w.dumps(data)
-    return Path(source).read_text(encoding="utf-8")
+    return Path(source).read_text(encoding="utf-8-sig")
 
 
 def _parsed(text: str, name: str) -> dict[str, Any]:

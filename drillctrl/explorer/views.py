@@ -12,8 +12,8 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.charts.chains import stable_strips
 from drillctrl.charts.chart import StabilityChart, chart
+from drillctrl.delay.closing import close_loop
 from drillctrl.designs.design import analyze
-from drillctrl.designs.result import Analysis
 from drillctrl.drilling.quantities import root_scales
 from drillctrl.explorer.commands import command_line, python_text
 from drillctrl.explorer.state import Asked, designed_law
@@ -34,25 +34,26 @@ _MODES = 3
 
 
 def roots(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
-    """Return whether the point is stable, with its roots; `analyze`."""
-    result = analyze(asked.case, *asked.feedback)
+    """Return whether the point is stable, with its roots; `analyze`.
+
+    With the option ``rough`` they are those of a collocation, which are there at once and
+    neither sharpened nor counted.
+    """
     (rate, real, per), (turn, imaginary, cycles) = root_scales(asked.rig)
-    loops = {"without control": result.plant} if asked.feedback else {}
-    loops[asked.given.get("structure") or "without control"] = result.system()
+    structure, *gains = asked.feedback or (None,)
+    case = asked.case
+    loops = {"without control": case.system(structure.inputs)} if structure else {}
+    own = close_loop(loops["without control"], structure, *gains) if structure else case.system()
+    loops[asked.given.get("structure") or "without control"] = own
     series = []
     for name, system in loops.items():
         found = approximate_roots(system, 2 * degree_for(system))[:_MOST_ROOTS]
         found = found[found.real > found.real[0] - 12.0]
         series.append({"name": name, "x": rate * found.real, "y": turn * found.imag})
-    return {
-        "sentence": _sentence(asked, result),
-        "stable": result.stable,
+    drawn: dict[str, Any] = {
         "series": series,
         "x": {"label": real, "unit": per},
         "y": {"label": imaginary, "unit": cycles},
-        "rightmost": rate * result.spectral_abscissa,
-        "data": {**result.to_dict(), "elapsed_seconds": None},
-        "summary": result.summary(),
         "command": command_line(asked, "analyze"),
         "python": python_text(
             asked,
@@ -61,17 +62,31 @@ def roots(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
             "print(result.summary())",
         ),
     }
+    if options.get("rough"):
+        top = complex(found[0])
+        sentence = _sentence(asked, top.real, abs(top.imag), top.real < 0.0)
+        drawn |= {"rough": True, "stable": top.real < 0.0, "rightmost": rate * top.real}
+        return {**drawn, "sentence": f"{sentence[:-1]}; being checked …"}
+    result = analyze(case, *asked.feedback)
+    dominant = result.loop.dominant_roots
+    beat = abs(dominant[0].imag) if dominant else 0.0
+    return {
+        **drawn,
+        "sentence": _sentence(asked, result.spectral_abscissa, beat, result.stable),
+        "stable": result.stable,
+        "rightmost": rate * result.spectral_abscissa,
+        "data": {**result.to_dict(), "elapsed_seconds": None},
+        "summary": result.summary(),
+    }
 
 
-def _sentence(asked: Asked, result: Analysis) -> str:
+def _sentence(asked: Asked, abscissa: float, beat: float, stable: bool) -> str:
     """Return the answer first: whether vibrations die away, how fast, at which frequency."""
     (rate, _, per), (turn, _, cycles) = root_scales(asked.rig)
-    alpha = rate * result.spectral_abscissa
-    dominant = result.loop.dominant_roots
-    beat = turn * abs(dominant[0].imag) if dominant else 0.0
+    alpha, beat = rate * abscissa, turn * beat
     at = f" at {beat:.3g} {cycles or 'of angular frequency'}" if beat else ""
     unit = " s" if per else ""
-    if result.stable:
+    if stable:
         return f"Stable: a vibration{at} falls to 2 % in {math.log(50.0) / -alpha:.3g}{unit}."
     if alpha <= 0.0:
         return "Undecided: roots and their count do not agree."

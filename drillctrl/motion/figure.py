@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes
+from drillctrl.base.figure import BLUE, GREY, ORANGE, axis_name, new_axes, plain_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,6 +56,7 @@ def plot_damping(
             many * amplitude, color=ORANGE, linestyle="-" if kind == "swing" else "--", label=told
         )
     ax.set_xscale("log")
+    plain_ticks(ax.xaxis)
     ax.set_xlabel(axis_name(f"{name} of the bit's speed", of))
     ax.set_ylabel(axis_name("damping left to the mode", unit))
     if title:
@@ -160,6 +161,7 @@ def plot_response(
         )  # fmt: skip
         ax.plot(model[0], getattr(model[1], part), color=colour, linewidth=1.1)
     ax.set_xscale("log")
+    plain_ticks(ax.xaxis)
     cycles = "Hz" if unit else ""
     ax.set_xlabel(axis_name("frequency" if unit else "frequency ω", cycles))
     ax.set_ylabel(axis_name(f"{'' if unit else 'H, '}torque of the bit per speed", unit))

@@ -11,10 +11,8 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where
 from drillctrl.motion.record import halves
-from drillctrl.motion.response import KICKS, settling_time, turned_case
-from drillctrl.simulation.outcome import grows_without_bound
+from drillctrl.motion.response import KICKS, Start, settling_time, turned_case
 from drillctrl.simulation.result import Simulation
-from drillctrl.simulation.run import simulate
 from drillctrl.simulation.status import Outcome, Status
 from drillctrl.simulation.summary import PER_STEP
 
@@ -90,25 +88,23 @@ def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOr
     """
     case = turned_case(where, 1.0)
     _, point = case.physics("an axial orbit")
-    wait = settling_time(case)
-    initial = {"dx": kick * point.penetration_rate}
-    options = {"backwards": "stop", **options}
-    run = simulate(case, duration=wait + _LOOKED_AT, initial=initial, **options)
-    broken: Status | Outcome | None = None if run.status == Status.DONE else run.status
-    if broken is None and grows_without_bound(run, run.at(run.times, ("x", "dx", "dtheta"))):
-        broken = Outcome.DIVERGES
-    if broken is not None:
+    start = Start(case, settling_time(case), 1.0, 0.0, kick, options)
+    start.settle()
+    run = start.run(_LOOKED_AT) if start.broken is None else None
+    if run is None or start.broken is not None:
         no = float("nan")
-        return AxialOrbit(False, None, no, no, no, no, no, no, no, no, np.zeros(0), broken)
-    means = halves(run, wait, _LOOKED_AT, 1.0)
-    tail = run.on_steps(PER_STEP, wait, ("dx", "depth"))
-    times = np.linspace(wait, float(run.times[-1]), _SAMPLES)
+        return AxialOrbit(
+            False, None, no, no, no, no, no, no, no, no, np.zeros(0), start.broken
+        )  # fmt: skip
+    means = halves(run, 0.0, _LOOKED_AT, 1.0)
+    tail = run.on_steps(PER_STEP, 0.0, ("dx", "depth"))
+    times = np.linspace(0.0, float(run.times[-1]), _SAMPLES)
     samples = run.at(times, ("torque_on_bit",)).torque_on_bit
     weight, torque = float(means.weight[0]), float(means.torque[0])
     settles = float(np.ptp(tail.dx)) <= _SETTLED * point.penetration_rate
     return AxialOrbit(
         settles,
-        None if settles else _period(run, wait),
+        None if settles else _period(run),
         weight,
         torque,
         weight / run.steady_load[0],
@@ -121,13 +117,13 @@ def axial_orbit(where: Where, kick: float = KICKS[0], **options: Any) -> AxialOr
     )
 
 
-def _period(run: Simulation, since: float) -> float | None:
+def _period(run: Simulation) -> float | None:
     """Return the time after which the motion repeats, by the states where x rises past its middle.
 
     The depth of cut stands for what the rock remembers.
     """
     names = ("x", "dx", "depth")
-    tail = run.on_steps(PER_STEP, since, names)
+    tail = run.on_steps(PER_STEP, 0.0, names)
     size = np.array([[np.ptp(getattr(tail, name))] for name in names])
     middle = 0.5 * float(tail.x.max() + tail.x.min())
     below = tail.x < middle

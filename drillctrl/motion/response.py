@@ -227,7 +227,7 @@ def _measured(
     ripple: bool,
     options: dict[str, Any],
 ) -> BitResponse:
-    starts = [_Start(case, settling, frequency, amplitude, kick, options) for kick in KICKS]
+    starts = [Start(case, settling, frequency, amplitude, kick, options) for kick in KICKS]
     while True:
         for start in starts:
             start.go_on()
@@ -242,7 +242,7 @@ def _measured(
             return found
 
 
-class _Start:
+class Start:
     """A run from one axial kick, gone on from as long as asked, and its windows."""
 
     def __init__(
@@ -272,19 +272,24 @@ class _Start:
         self.swing = 0.0
         self.broken: Status | Outcome | None = None
 
-    def go_on(self) -> None:
-        """Wait for the orbit if that was not done, and look at some more windows."""
-        piece = self.per_run * self.half
+    def settle(self) -> None:
+        """Wait for the orbit if that was not done."""
         while self.wait > 0.0 and self.broken is None:
-            self._run(min(self.wait, piece))
-            self.wait = max(0.0, self.wait - piece)
+            piece = min(self.wait, self.per_run * self.half)
+            self.run(piece)
+            self.wait -= piece
+
+    def go_on(self) -> None:
+        """Look at some more windows of the orbit."""
+        self.settle()
         for _ in range(_PER_RUN // self.per_run):
             if self.broken is None:
-                run = self._run(piece)
+                run = self.run(self.per_run * self.half)
             if self.broken is None:
                 self.found.append(halves(run, 0.0, self.half, self.frequency))
 
-    def _run(self, duration: float) -> Simulation:
+    def run(self, duration: float) -> Simulation:
+        """Go on for so long, and say so where that breaks off."""
         run = simulate(self.case, duration=duration, scenario=self.scenario, **self.options)
         if run.status != Status.DONE:
             self.broken = run.status
@@ -302,9 +307,7 @@ class _Start:
         return Halves(*[np.concatenate(parts) for parts in zip(*self.found, strict=True)])
 
 
-def _response(
-    starts: list[_Start], frequency: float, amplitude: float, ripple: bool
-) -> BitResponse:
+def _response(starts: list[Start], frequency: float, amplitude: float, ripple: bool) -> BitResponse:
     """Return what the windows so far say."""
     broken = [start.broken for start in starts if start.broken is not None]
     if broken:

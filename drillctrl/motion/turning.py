@@ -65,7 +65,8 @@ class Turned(Block):
         signals = tuple(made.states[i] for i in states)
         return replace(
             made, states=signals, inputs=(), outputs=signals, A=a, E=load, B=ca.SX(size, 0), T=top,
-            C=ca.SX.eye(size), R=made.R[states, :], late=(),
+            C=ca.SX.eye(size), R=made.R[states, :], late=(), drag=ca.SX(0, 2),
+            side_force=ca.SX(0, 0), side_rate=ca.SX(0, 1), side_torque=ca.SX(0, 1),
         )  # fmt: skip
 
 

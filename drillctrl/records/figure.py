@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name, headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +35,7 @@ def plot_motion(
         ax.plot(time, _RPM * top, color=BLUE, linewidth=1.1, label="top drive")
     ax.set_xlabel(axis_name("time", "s"))
     ax.set_ylabel(axis_name("rotary speed", "rpm"))
-    ax.legend(fontsize="small", loc="upper right")
+    _legend_above(ax)
 
 
 def plot_torque(ax: Axes, time: FloatArray, torque: FloatArray, carried: FloatArray | None) -> None:
@@ -45,6 +45,14 @@ def plot_torque(ax: Axes, time: FloatArray, torque: FloatArray, carried: FloatAr
     ax.plot(time, 1e-3 * torque, color=BLUE, linewidth=1.1, label="measured at the top")
     ax.set_xlabel(axis_name("time", "s"))
     ax.set_ylabel(axis_name("torque", "kN·m"))
+    _legend_above(ax)
+
+
+def _legend_above(ax: Axes) -> None:
+    """Show the legend in room of its own above the curves."""
+    low, high = ax.get_ylim()
+    count = len(ax.get_legend_handles_labels()[1])
+    ax.set_ylim(low, high + (0.05 + 0.14 * count) * (high - low))
     ax.legend(fontsize="small", loc="upper right")
 
 
@@ -56,7 +64,7 @@ def plot_severity(
     ax.axhline(_FULL, color=GREY, linewidth=0.9, linestyle="--", label="full stick-slip")
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel(axis_name("time", "s"))
-    ax.set_ylabel(axis_name(name))
+    ax.set_ylabel(headline(axis_name(name), 28))
     ax.legend(fontsize="small")
 
 
@@ -84,7 +92,7 @@ def plot_spectrum(
     if period is not None:
         ax.axvline(1.0 / period, color=GREEN, linestyle="--", linewidth=1.1, label="stick-slip")
     ax.set_xlabel(axis_name("frequency", "Hz"))
-    ax.set_ylabel(axis_name("torque per root of frequency", "kN·m/√Hz"))
+    ax.set_ylabel(headline(axis_name("torque per root of frequency", "kN·m/√Hz"), 28))
     if modes or period is not None:
         ax.legend(fontsize="small")
 
@@ -99,7 +107,7 @@ def plot_drive(
     else:
         ax.semilogx(frequency, reflection, ".", color=BLUE, markersize=4)
         ax.set_ylim(0.0, 1.2)
-        ax.set_ylabel(axis_name("reflection of the drive"))
+        ax.set_ylabel(headline(axis_name("reflection of the drive"), 28))
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter("")
     ax.set_xticks([place for place in _MARKS if frequency[0] <= place <= frequency[-1]])

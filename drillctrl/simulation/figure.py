@@ -98,6 +98,8 @@ def plot_motion(run: Trace, inputs: Sequence[str] = (), title: str | None = None
     for ax, name in zip(axes, names, strict=True):
         plot_signal(run, name, ax)
         ax.set_xlabel("")
+        # Panels are low: a long label would run into the next one's.
+        ax.set_ylabel(headline(ax.get_ylabel(), 24))
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         axes[0].legend(handles, labels, loc="upper left", fontsize="small")
@@ -182,7 +184,8 @@ def plot_phase_portrait(
     ax.set_xlabel(right.label)
     ax.set_ylabel(high.label)
     ax.set_title(headline(title or title_of(run), 56), fontsize="medium")
-    ax.legend(loc="best", fontsize="small")
+    # The orbit leaves no corner free.
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, fontsize="small")
     return ax
 
 

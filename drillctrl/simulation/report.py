@@ -10,7 +10,8 @@ import numpy as np
 
 from drillctrl.base import units
 from drillctrl.base.text import set_out, wrapped
-from drillctrl.drilling.drive import TopDrive
+from drillctrl.delay.structure import FeedbackStructure
+from drillctrl.drilling.drive import CONSTANT_TORQUE, TopDrive
 from drillctrl.drilling.quantities import told_scale
 from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
 _LASTING = (Outcome.ORBIT, Outcome.CHAOTIC, Outcome.BOUNCES, Outcome.STICK_SLIP)
 # Steps by which chattering is told, and how short they are then on the mean.
 _LAST_STEPS, _CHATTER = 10_000, 1e-3
+# The same of a sampled command: over so much of the run and of so many samples, how many are at
+# a limit, and how many jump to the other one next. A command that turns with the motion does so
+# once in many samples.
+_TAIL, _FEWEST_SAMPLES, _ALWAYS, _OFTEN = 0.25, 16, 0.9, 0.25
 
 
 def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> dict[str, Any]:
@@ -40,6 +45,7 @@ def simulation_fields(run: Simulation, multipliers: Floquet | None = None) -> di
         "schema": "drillctrl/simulate/1",
         "operating_point": dataclasses.asdict(run.point),
         "structure": controller.feedback.name if controller else None,  # type: ignore[union-attr]
+        "drive": _drive_of(run),
         "model": run.model,
         "cutting": run.cutting,
         "duration": run.duration,
@@ -102,12 +108,24 @@ def _load_lines(run: Simulation) -> list[tuple[str, str]]:
     return lines
 
 
+def _drive_of(run: Simulation) -> str | None:
+    """Return the law of the top drive; None where there is no drive."""
+    if not any(isinstance(block, TopDrive) for block in run.case.physics("a run")[0].blocks):
+        return None
+    law = None if run.controller is None else run.controller.feedback
+    if isinstance(law, FeedbackStructure) and "drive" in law.inputs:
+        return law.name
+    return CONSTANT_TORQUE
+
+
 def _drive_lines(run: Simulation) -> list[tuple[str, str]]:
-    """Say what turns a string whose drive is under no law."""
-    free = any(isinstance(block, TopDrive) for block in run.case.physics("a run")[0].blocks)
-    if run.controller is not None or not free:
+    """Say what turns a string under a top drive."""
+    law = _drive_of(run)
+    if law is None:
         return []
-    return [("Drive", "its torque is constant: no law was given, such as stiff")]
+    if law == CONSTANT_TORQUE:
+        return [("Drive", "its torque is constant: no law was given, such as stiff")]
+    return [("Drive", law)]
 
 
 def _backwards_lines(run: Simulation) -> list[tuple[str, str]]:
@@ -121,7 +139,13 @@ def _backwards_lines(run: Simulation) -> list[tuple[str, str]]:
 
 
 def _chatter_lines(run: Simulation) -> list[tuple[str, str]]:
-    """Say that gains act like a relay, where that used up the steps."""
+    """Say that gains act like a relay, where that used up the steps or shows in the samples."""
+    switched = _switched(run)
+    if switched is not None:
+        return [
+            ("", f"at its limit in every sample, at the other one in {switched:.0%} of the next:"),
+            ("", "gains this high act like a relay; lower gains or a shorter period end that"),
+        ]
     last = np.diff(run.times)[-_LAST_STEPS:]
     if run.status != Status.STEP_LIMIT or run.controller is None or not last.size:
         return []
@@ -131,6 +155,28 @@ def _chatter_lines(run: Simulation) -> list[tuple[str, str]]:
         ("", f"the last {last.size} steps are {last.mean():.1g} long: gains this high act like"),
         ("", "a relay and chatter; a sampling period or lower gains would end that"),
     ]
+
+
+def _switched(run: Simulation) -> float | None:
+    """Return how often an input jumps from limit to limit between samples of the last quarter.
+
+    None where it is not at a limit nearly always, or stays on one side for many samples: then
+    more than the sign of what is fed back reaches the plant.
+    """
+    given, end = run.controller, float(run.times[-1])
+    if given is None or given.period is None or given.limit is None:
+        return None
+    samples = np.arange((1.0 - _TAIL) * end + 0.5 * given.period, end, given.period)
+    if samples.size < _FEWEST_SAMPLES:
+        return None
+    motion = run.at(samples, run.input_names)
+    for name in run.input_names:
+        values = getattr(motion, name)
+        side = np.where(np.abs(values) >= 0.999 * given.limit, np.sign(values), 0.0)
+        jumps = float((side[1:] * side[:-1] < 0.0).mean())
+        if np.abs(side).mean() > _ALWAYS and jumps > _OFTEN:
+            return jumps
+    return None
 
 
 def _near_zero(value: float, scale: float) -> float:

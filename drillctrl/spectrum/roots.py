@@ -167,15 +167,20 @@ def _counted(system: DelaySystem, depth: float, line: float | None) -> _Gathered
     climb.ascend(_first_places(system))
     if line is None:
         depth = max(min(depth, unit), 0.05 * unit)
-    found = None
+    found, refused = None, None
     for _ in range(20):
         floor = float(climb.roots[0].real) - depth if line is None else line
-        found = climb.right_of(floor, MOST_ROOTS if line is not None or depth == unit else _FEW)
+        try:
+            most = MOST_ROOTS if line is not None or depth == unit else _FEW
+            found = climb.right_of(floor, most)
+        except UndecidedError as error:
+            # Nearer to the rightmost root there are fewer to find.
+            refused = error
         if found is not None or line is not None:
             break
-        depth *= 0.25
+        depth *= 0.25 if refused is None else 0.02
     if found is None:
-        raise climb.refuse(f"more than {MOST_ROOTS} roots lie right of {floor:.6g}")
+        raise refused or climb.refuse(f"more than {MOST_ROOTS} roots lie right of {floor:.6g}")
     s, done = polish(system, found) if found.size <= _FEW else (found, np.ones(found.size, bool))
     if not done.all():
         raise climb.refuse(f"{int((~done).sum())} of {done.size} roots do not converge")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from drillctrl.base.arrays import ComplexArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.drive import TopDrive
 from drillctrl.drilling.hoist import Hoist
@@ -71,12 +72,17 @@ class StringAtBit:
         speed, moment = self.control.ends(at)
         return speed, np.asarray(at * moment)
 
-    @property
-    def time_scale(self) -> float:
-        """Seconds to the unit of time of dimensionless points, √(I/Kt) of a lumped string."""
+    @functools.cached_property
+    def scales(self) -> tuple[FloatArray, float]:
+        """SI values of loads per state, (2, 4), and of a unit of time of dimensionless points.
+
+        Of a lumped string; time is √(I/Kt), s.
+        """
         unit = self.units or self.string
-        torsional = lumped(unit, unit.torsion)
-        return float(np.sqrt(torsional.mass / torsional.stiffness))
+        axial, torsional = lumped(unit, unit.tension), lumped(unit, unit.torsion)
+        time = math.sqrt(torsional.mass / torsional.stiffness)
+        efforts = np.array([axial.mass / time**2, torsional.stiffness])
+        return np.outer(efforts, [1.0, time, 1.0, time]), time
 
     @functools.cached_property
     def growing(self) -> int:

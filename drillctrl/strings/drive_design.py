@@ -16,6 +16,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.strings.bit_load import BitLoad
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_family import DriveSignals, LawFamily, drive_signals
 from drillctrl.strings.drive_rules import soft_torque_control
@@ -57,6 +58,9 @@ class _Loop(NamedTuple):
         The drive there.
     weights : array, (q,)
         By which a critical slope there counts.
+    answer, force : complex array and array, (q,)
+        What the bit answers there, N m s/rad; the square of the torque by which it shakes the
+        string, over that of its mean speed.
     near, echo : DriveSignals and array, (r,)
         The drive a little right of the axis, from the real axis on, and what the string with a
         free bit returns there of a wave from the top.
@@ -70,6 +74,8 @@ class _Loop(NamedTuple):
     matrix: ComplexArray
     drive: DriveSignals
     weights: FloatArray
+    answer: ComplexArray
+    force: FloatArray
     near: DriveSignals
     echo: ComplexArray
     far: DriveSignals
@@ -92,7 +98,7 @@ class _Slopes:
         for i, loop in enumerate(self.loops):
             if self._grows(numbers, loop):
                 return -np.inf, i, 0
-            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive)
+            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
             up = np.nonzero((z.imag[:-1] < 0.0) & (z.imag[1:] >= 0.0))[0]
             if not up.size:
                 continue
@@ -111,9 +117,10 @@ class _Slopes:
             return np.inf, np.zeros(numbers.size)
         loop, here, pipe = self.loops[i], slice(at, at + 2), self.family.pipe
         s, matrix, drive = loop.s[here], loop.matrix[here], loop.drive.pick(here)
+        answer = loop.answer[here]
 
         def crossing(moved: FloatArray) -> float:
-            z = self._impedance(moved, s, matrix, drive)
+            z = self._impedance(moved, s, matrix, drive) + answer
             share = -z.imag[0] / (z.imag[1] - z.imag[0])
             return float(z.real[0] + share * (z.real[1] - z.real[0]))
 
@@ -152,6 +159,34 @@ class _Slopes:
         return bool(_turns(whole) or _turns(returned))
 
 
+class _Swing(_Slopes):
+    """The logarithm of the mean square of the bit's speed over all loops, and its gradient.
+
+    Infinite where a mode grows with what the bit answers.
+    """
+
+    def value(self, numbers: FloatArray) -> tuple[float, int, int]:
+        """Return minus the logarithm, and where the smallest slope is."""
+        slope, i, at = super().value(numbers)
+        return -self._mean_square(numbers) if slope > 0.0 else -np.inf, i, at
+
+    def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
+        """Return the value to minimise and its gradient."""
+        value = -self.value(numbers)[0]
+        if not np.isfinite(value):
+            return np.inf, np.zeros(numbers.size)
+        steps = _CHANGE * np.eye(numbers.size)
+        around = np.array([self._mean_square(numbers + step) for step in steps])
+        return value, (around - value) / _CHANGE
+
+    def _mean_square(self, numbers: FloatArray) -> float:
+        found = 0.0
+        for loop in self.loops:
+            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
+            found += float((loop.force / np.abs(z) ** 2).sum())
+        return math.log(found / len(self.loops))
+
+
 def _turns(values: ComplexArray) -> bool:
     """Whether a function turns about 0 on its way from a real value to its last one."""
     turned = np.angle(values[1:] / values[:-1]).sum() + np.angle(values[0])
@@ -172,7 +207,7 @@ def stretched(line: Line, factor: float) -> Line:
     return Line(tuple(others))
 
 
-def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
+def _loop(line: Line, machine: DriveMachine, aim: float, rate: float, bit: BitLoad | None) -> _Loop:
     modes, ends = mode_bands(line, MODES)
     step = float(modes[0]) / _PER_MODE
     # Between their poles impedances are smooth: so many samples between modes will do.
@@ -209,12 +244,17 @@ def _loop(line: Line, machine: DriveMachine, aim: float, rate: float) -> _Loop:
     within = np.linspace(edges[:-1], edges[1:], _WITHIN, axis=1)
     loudest = np.abs(echo(right_of(within.ravel()))).reshape(within.shape).max(axis=1)
     alone = right_of(np.append(0.0, np.geomspace(1e-3, _HIGHEST, _ALONE)))
+    answer, force = np.zeros(s.size, dtype=complex), np.zeros(s.size)
+    if bit is not None:
+        answer = bit.answer(frequencies)
+        force = bit.shaking(frequencies) * np.gradient(frequencies) / bit.speed**2
     drives = [
         drive_signals(machine, pipe, rate, at) for at in (s, near, right_of(edges[1:]), alone)
     ]
     return _Loop(
-        s, matrix, drives[0], weights, drives[1], echo(near), drives[2], loudest, drives[3]
-    )
+        s, matrix, drives[0], weights, answer, force,
+        drives[1], echo(near), drives[2], loudest, drives[3],
+    )  # fmt: skip
 
 
 @checks_kinds
@@ -223,6 +263,7 @@ def dynamic_drive_control(
     machine: DriveMachine,
     order: int = 2,
     length_error: float = 0.2,
+    bit: BitLoad | None = None,
 ) -> DriveControl:
     """Design dynamic feedback for the largest smallest critical slope of the first four modes.
 
@@ -237,6 +278,9 @@ def dynamic_drive_control(
     length_error : float
         The design holds for strings that are shorter and longer by that share, and for a drive
         whose delay is half as long again.
+    bit : BitLoad, optional
+        What the bit does where it drills: slopes are then what its answer leaves of them, and of
+        the laws under which none vanishes the law is that under which the bit is shaken least.
 
     Returns
     -------
@@ -251,24 +295,26 @@ def dynamic_drive_control(
     rate = 2.0 * math.pi * math.sqrt(float(modes[0] * modes[-1]))
     aim = _AIM * lowest_impedance(line)
     lengths = (line, *(stretched(line, 1.0 + sign * error) for sign in (-1, 1) if error))
-    loops = [_loop(each, machine, aim, rate) for each in lengths]
+    loops = [_loop(each, machine, aim, rate, bit) for each in lengths]
     if machine.delay > 0.0:
         later = replace(machine, delay=_LATER * machine.delay)
-        loops.append(_loop(line, later, aim, rate))
+        loops.append(_loop(line, later, aim, rate, bit))
     known = np.array([[4.0, 0.25, 0.0], [30.0, 0.1, 4.0], [40.0, 0.175, 9.0]])
     for grown in range(n % 2, n + 1, 2):
         family = LawFamily(grown, line.wave_impedance, rate, machine)
         known = _best(family, _Slopes(family, loops), known)[None, :]
+    if bit is not None and np.isfinite((goal := _Swing(family, loops)).value(known[0])[0]):
+        known = _best(family, goal, known)[None, :]
     found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
     soft = soft_torque_control(machine, line.wave_impedance, float(modes[0]))
 
     def stands(law: DriveControl) -> float:
         return min(mode.slope for mode in mode_slopes(line, law, MODES))
 
-    # What stands less than soft torque was found for the sake of the longer and shorter strings.
-    if drive_is_stable(line, found) and (
-        stands(found) >= stands(soft) or not drive_is_stable(line, soft)
-    ):
+    # What stands less than soft torque was found for the sake of the longer and shorter strings,
+    # or of the torque of the bit.
+    enough = bit is not None or stands(found) >= stands(soft) or not drive_is_stable(line, soft)
+    if drive_is_stable(line, found) and enough:
         return found
     return replace(found, speed=soft.speed, torque=soft.torque)
 

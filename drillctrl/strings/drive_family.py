@@ -2,7 +2,7 @@
 
 The law brakes by the top's speed and angle and drives by the pipe's torque, with N states:
 
-    A(s) = h (1 + k/s) + a(s)/e(s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
+    A(s) = (h + a(s)/e(s)) (1 + k/s),  B(s) = g + b(s)/e(s),  deg e = N, deg a, b < N,
 
 k not below what brings a speed that sags back in some seconds, e in factors of first and second
 order that are damped.
@@ -91,20 +91,22 @@ class LawFamily:
     def ends(self, numbers: FloatArray, drive: DriveSignals) -> tuple[ComplexArray, ComplexArray]:
         """Return what `DriveControl.ends` does, quickly."""
         x = drive.x
-        speed, torque = numbers[0] * (1.0 + numbers[1] / x), np.asarray(numbers[2], dtype=complex)
+        speed, torque = (np.asarray(numbers[i], dtype=complex) for i in (0, 2))
         for below, a, b in self._sections(numbers):
             under = 1.0 / _value(below, x)
             speed = speed + _value(a, x) * under
             torque = torque + _value(b, x) * under
-        return 1.0 + drive.torque * torque, drive.inertia + drive.speed * speed
+        speed = drive.speed * speed * (1.0 + numbers[1] / x)
+        return 1.0 + drive.torque * torque, drive.inertia + speed
 
     def laws(self, numbers: FloatArray) -> tuple[Transfer, Transfer]:
         """Return A and B."""
-        speed = (numbers[0] * np.array([1.0, numbers[1]]), np.array([1.0, 0.0]))
+        speed = (np.array([numbers[0]]), np.ones(1))
         torque = (np.array([numbers[2]]), np.ones(1))
         for below, a, b in self._sections(numbers):
             speed, torque = _sum(speed, a, below), _sum(torque, b, below)
-        return self._transfer(self.pipe * speed[0], speed[1]), self._transfer(*torque)
+        above = self.pipe * np.convolve(speed[0], [1.0, numbers[1]])
+        return self._transfer(above, np.append(speed[1], 0.0)), self._transfer(*torque)
 
     def _transfer(self, above: FloatArray, below: FloatArray) -> Transfer:
         """Return a function of s from coefficients of x."""

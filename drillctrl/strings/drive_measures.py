@@ -118,8 +118,8 @@ class DriveMeasures:
         return {
             "structure": self.control.name,
             "stable": self.stable,
-            "recommended": self.verdict.recommended,
-            "reason": self.verdict.reason(),
+            "recommended": self.verdict.untried,
+            "reason": self.verdict.untried_reason(),
             "smallest_critical_slope": self.smallest_slope,
             "weakest_mode": self.weakest
             and {

@@ -20,7 +20,7 @@ from drillctrl.drilling.rig import Rig
 from drillctrl.strings.changed import changed_rig
 from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
-from drillctrl.strings.drive_verdict import DriveVerdict, drive_verdict
+from drillctrl.strings.drive_verdict import UNTRIED, DriveVerdict, drive_verdict
 from drillctrl.strings.drives import drive_control, machine_of
 from drillctrl.strings.drives_words import settings_text
 from drillctrl.strings.falling import FallingTorque
@@ -85,8 +85,8 @@ class DriveTable:
                 {
                     "depth": depth,
                     "stable": drive.stable,
-                    "recommended": drive.verdict.recommended,
-                    "reason": drive.verdict.reason(),
+                    "recommended": drive.verdict.untried,
+                    "reason": drive.verdict.untried_reason(),
                     "smallest_critical_slope": drive.smallest_slope,
                     "weakest_slope": weakest and (weakest.slope if drive.stable else 0.0),
                     "weakest_frequency": weakest and weakest.frequency,
@@ -105,8 +105,8 @@ class DriveTable:
             "structure": self.structure,
             "top_drive": asdict(self.drives[0].control.machine),
             "stable": self.stable,
-            "recommended": self.harm is None,
-            "reason": self.harm,
+            "recommended": None if self.harm is None else False,
+            "reason": self.harm or UNTRIED,
             "nodes": [{**row, "law": law} for row, law in zip(self._rows(), laws, strict=True)],
             "elapsed_seconds": self.elapsed_seconds,
         }
@@ -146,8 +146,9 @@ class DriveTable:
         if self.between:
             stood = f"{slope.per_si * min(self.between):.4g} {per}"
             lines.append(f"Held to the middle between depths, laws stand {stood} there")
-        if self.harm is not None:
-            lines.append(wrapped(f"Refused: at {self.harm}."))
+        lines.append(
+            wrapped(f"Refused: at {self.harm}." if self.harm else f"{UNTRIED.capitalize()}.")
+        )
         return "\n".join(lines)
 
     def _laws(self) -> list[tuple[float, DriveMeasures]]:

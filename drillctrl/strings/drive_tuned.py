@@ -1,11 +1,14 @@
-"""Z-torque with the impedance that its string stands most under."""
+"""Laws of the field with the impedance at the top that does most for their string."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.strings.bit_load import BitLoad
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_rules import z_torque_control
 from drillctrl.strings.line import Line
@@ -46,15 +49,47 @@ def tuned_z_torque(line: Line, machine: DriveMachine) -> DriveControl:
         If string and drive are unstable under all of these.
     """
     found = []
-    for times in np.geomspace(_LEAST, _MOST, _LOOKED).tolist():
-        law = z_torque_control(machine, line.wave_impedance, times)
-        if drive_is_stable(line, law):
-            weakest = weakest_slope(line, law)
-            found.append((lowest_impedance(line) if weakest is None else weakest.slope, law))
-    if not found:
-        wanted = f"one under which some of {_LEAST:g} to {_MOST:g} times the pipe's is stable"
-        raise InputError("drive", f"{machine.lateness:g} s late", wanted)
+    laws = _stable_laws(line, lambda times: z_torque_control(machine, line.wave_impedance, times))
+    for law in laws:
+        weakest = weakest_slope(line, law)
+        found.append((lowest_impedance(line) if weakest is None else weakest.slope, law))
     least = _KEPT * max(slope for slope, _ in found)
     kept = [law for slope, law in found if slope >= least]
     law = max(kept, key=lambda law: min(mode.slope for mode in mode_slopes(line, law, _MODES)))
     return DriveControl(TUNED, machine, law.speed, law.torque)
+
+
+def tuned_on_load(
+    line: Line, bit: BitLoad, law_at: Callable[[float], DriveControl]
+) -> DriveControl:
+    """Return the law under which the bit is shaken least where it drills.
+
+    Parameters
+    ----------
+    line : Line
+        The string in torsion.
+    bit : BitLoad
+        What the bit does there.
+    law_at : callable
+        The law of a wanted impedance over that of the pipe.
+
+    Raises
+    ------
+    InputError
+        If string and drive are unstable under all of these.
+    """
+
+    laws = _stable_laws(line, law_at)
+    left = [min(bit.damping_left(mode) for mode in mode_slopes(line, law, _MODES)) for law in laws]
+    if max(left) <= 0.0:
+        return laws[int(np.argmax(left))]
+    good = [law for law, own in zip(laws, left, strict=True) if own > 0.0]
+    return min(good, key=lambda law: bit.mean_square(line, law))
+
+
+def _stable_laws(line: Line, law_at: Callable[[float], DriveControl]) -> list[DriveControl]:
+    laws = [law_at(times) for times in np.geomspace(_LEAST, _MOST, _LOOKED).tolist()]
+    if found := [law for law in laws if drive_is_stable(line, law)]:
+        return found
+    wanted = f"one under which some of {_LEAST:g} to {_MOST:g} times the pipe's is stable"
+    raise InputError("drive", f"{laws[0].machine.lateness:g} s late", wanted)

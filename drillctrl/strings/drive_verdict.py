@@ -19,6 +19,7 @@ from drillctrl.strings.slopes import (
 # Share of what a string stands under a stiff drive, and of the pipe's impedance, by which it may
 # stand less: the damping of strings is not known that well.
 _SHARE, _LITTLE = 0.05, 0.01
+UNTRIED = "not tried on the nonlinear motion"
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,16 @@ class DriveVerdict:
         A law may take from a mode that has much: vibration begins at the weakest.
         """
         return self.stable and (self.weakest is None or self.weakest.slope >= self.enough)
+
+    @property
+    def untried(self) -> bool | None:
+        """What is known without a run: False where it is refused, else None."""
+        return None if self.recommended else False
+
+    def untried_reason(self) -> str:
+        """Say why it is refused, or that no run was made."""
+        told = self.reason()
+        return f"{UNTRIED}; of the string alone, {told}" if self.recommended else told
 
     def reason(self, language: Language = SI) -> str:
         """Say in one sentence why."""

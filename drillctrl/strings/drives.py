@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from drillctrl.base.errors import InputError
@@ -12,12 +12,20 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.rig import Rig
+from drillctrl.strings.bit_load import BitLoad
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_design import dynamic_drive_control
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
 from drillctrl.strings.drive_observer import observer_drive_control
-from drillctrl.strings.drive_rules import RULES, pi_control, rule_control
-from drillctrl.strings.drive_tuned import TUNED, tuned_z_torque
+from drillctrl.strings.drive_rules import (
+    RULES,
+    first_frequency,
+    pi_control,
+    rule_control,
+    soft_torque_control,
+    z_torque_control,
+)
+from drillctrl.strings.drive_tuned import TUNED, tuned_on_load, tuned_z_torque
 from drillctrl.strings.drives_words import comparison_summary
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
@@ -28,6 +36,8 @@ if TYPE_CHECKING:
 _DYNAMIC = tuple(f"dynamic-{n}" for n in range(5))
 _OBSERVERS = tuple(f"observer-{n}" for n in range(1, 4))
 DRIVE_NAMES = (*RULES, TUNED, *_OBSERVERS, *_DYNAMIC)
+# What can be tuned to what a bit does; the others have a rule of their own.
+ON_LOAD = ("soft-torque", "z-torque", TUNED, *_DYNAMIC)
 _MODES = 4
 
 
@@ -72,7 +82,7 @@ class DriveComparison:
             {
                 "structure": drive.control.name,
                 "stable": drive.stable,
-                "recommended": drive.verdict.recommended,
+                "recommended": drive.verdict.untried,
                 "delay_margin": drive.delay_margin,
                 **mode.to_dict(),
             }
@@ -106,7 +116,9 @@ class DriveComparison:
 
 
 @checks_kinds
-def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> DriveControl:
+def drive_control(
+    name: str, rig: StringRig, length_error: float = 0.2, bit: BitLoad | None = None
+) -> DriveControl:
     """Return the law of a name for the drive of a rig, designed if it is a dynamic one.
 
     Parameters
@@ -118,18 +130,26 @@ def drive_control(name: str, rig: StringRig, length_error: float = 0.2) -> Drive
         With a top drive.
     length_error : float
         Share by which the string may be shorter and longer in the design of a dynamic law.
+    bit : BitLoad, optional
+        What the bit does where it drills: the laws of `ON_LOAD` are then those under which it
+        swings least there.
 
     Raises
     ------
     InputError
         If there is no such law, or no top drive.
     """
-    machine = machine_of(rig)
+    machine, line = machine_of(rig), rig.string.torsion
     if name in _DYNAMIC:
-        order = int(name[-1])
-        return dynamic_drive_control(rig.string.torsion, machine, order, length_error)
+        return dynamic_drive_control(line, machine, int(name[-1]), length_error, bit)
+    if bit is not None and name in ON_LOAD:
+        pipe, first = line.wave_impedance, first_frequency(rig.string)
+        if name == "soft-torque":
+            return tuned_on_load(line, bit, lambda t: soft_torque_control(machine, pipe, first, t))
+        found = tuned_on_load(line, bit, lambda t: z_torque_control(machine, pipe, t))
+        return replace(found, name=name)
     if name == TUNED:
-        return tuned_z_torque(rig.string.torsion, machine)
+        return tuned_z_torque(line, machine)
     if name in _OBSERVERS:
         return observer_drive_control(rig.string.torsion, machine, int(name[-1]))
     if name not in RULES:

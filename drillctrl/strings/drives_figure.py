@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_figure
+from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, new_figure, plain_ticks
 from drillctrl.strings.drive_roots import DriveRoot
 
 if TYPE_CHECKING:
@@ -62,7 +62,9 @@ def plot_drives(drives: Mapping[str, Curves], pipe: float, title: str = "") -> F
         damping.axhline(0.0, color=GREY, lw=0.6)
     else:
         damping.set_yscale("log")
+        plain_ticks(damping.yaxis)
     damping.set_ylabel("damping, % of critical")
     damping.set_xscale("log")
+    plain_ticks(damping.xaxis)
     damping.set_xlabel("frequency, Hz")
     return figure

@@ -10,6 +10,7 @@ from drillctrl.base.text import WIDTH, wrapped
 from drillctrl.strings.drive_control import DriveControl, Transfer
 from drillctrl.strings.drive_law import without_integral
 from drillctrl.strings.drive_measures import DriveMeasures
+from drillctrl.strings.drive_verdict import UNTRIED
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
 from drillctrl.strings.slopes import HIGHEST
@@ -92,7 +93,7 @@ def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: L
     if not good:
         return "None of these: under each the string swings by itself or stands too little."
     best = max(good, key=lambda drive: drive.smallest_slope)
-    told = setting_sentence(best.control, language)
+    told = f"{setting_sentence(best.control, language)} It was {UNTRIED}."
     speed = threshold_speed(best)
     if not math.isfinite(speed):
         return told

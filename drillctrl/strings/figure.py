@@ -93,7 +93,7 @@ def plot_modes(modes: tuple[Mode, ...], ax: Axes, language: Language = SI) -> Ax
     ax.axvline(0.0, color=GREY, lw=0.6)
     ax.set_xlabel("shape, dimensionless")
     ax.set_title(f"{modes[0].kind} modes", fontsize=10)
-    ax.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.2))
+    ax.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12))
     return ax
 
 

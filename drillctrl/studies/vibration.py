@@ -41,7 +41,7 @@ from drillctrl.studies.vibration_point import (
     measure_point,
 )
 from drillctrl.studies.vibration_text import closing_text, map_summary, place_text
-from drillctrl.studies.vibration_threshold import torsional_field
+from drillctrl.studies.vibration_threshold import check_threshold, torsional_field
 from drillctrl.studies.vibration_values import MapValues, Severity
 from drillctrl.tables.gain_table import GainTable
 
@@ -168,7 +168,7 @@ def vibration_map(
         Of each run, dimensionless.
     threshold : bool
         Whether to look as well where torsion has damping left on the axial orbit that is drilled
-        with; see `torsional_threshold`. Not for strings of sections.
+        with; see `torsional_threshold`. Not for strings under a top drive.
     mark : bool
         Whether the operating point is marked, where it lies on the map.
     surroundings : mapping, optional
@@ -219,6 +219,8 @@ def vibration_map(
             cases[node] = closed(*value.tolist())
         return cases[node]
 
+    if threshold:
+        check_threshold(case)
     names = _checked_starts(starts, closed_node((0, 0))[-1][0])
     # What cannot be simulated at a corner is refused before anything is.
     for node in ((0, 0), (shape[0] - 1, shape[1] - 1)):

@@ -25,14 +25,16 @@ from drillctrl.motion.torsion import torsional_modes
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.status import Outcome
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.strings.rig import StringRig
 from drillctrl.studies.tasks import run_tasks, task_key
 from drillctrl.studies.vibration_point import FEW_STATES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# The bit's answer changes slowly over a map: at most so many points across and up.
-_ACROSS, _UP = 13, 9
+# The bit's answer changes slowly over a map: at most so many points across and up, and fewer
+# of a string of sections, where one takes ten seconds and more.
+_MOST, _MOST_OF_STRING = (13, 9), (7, 5)
 SWING = 0.03
 TORSION = "#7A0177"
 
@@ -75,6 +77,13 @@ class _Task:
         return "-".join(keys)
 
 
+def check_threshold(case: Case) -> None:
+    """Raise `InputError` if a top drive turns the string: its own motion is not looked at."""
+    if isinstance(case.rig, StringRig) and case.rig.drive is not None:
+        wanted = "left out for a string under a top drive, whose own motion is not in it"
+        raise InputError("threshold", "asked for", wanted)
+
+
 def torsional_field(
     plane: Plane,
     counts: tuple[int, int],
@@ -96,22 +105,15 @@ def torsional_field(
     executor, checkpoint, progress
         As in `vibration_map`.
 
-    Raises
-    ------
-    InputError
-        If the plant is a long string.
-
     Notes
     -----
     The answer H of the bit is that of its axial orbit, which torque hardly changes: one for all
     columns (`bit_response`). Torsion with that answer and the gains is linear.
     """
     plant, _ = plane.case.physics("a threshold")
-    if len(plant.state_names) > FEW_STATES:
-        wanted = "left out for a string of sections, whose bit takes minutes a point to answer"
-        raise InputError("threshold", "asked for", wanted)
-    x = np.linspace(plane.x.low, plane.x.high, min(counts[0], _ACROSS))
-    y = np.linspace(plane.y.low, plane.y.high, min(counts[1], _UP))
+    most = _MOST if len(plant.state_names) <= FEW_STATES else _MOST_OF_STRING
+    x = np.linspace(plane.x.low, plane.x.high, min(counts[0], most[0]))
+    y = np.linspace(plane.y.low, plane.y.high, min(counts[1], most[1]))
     places = [(a, b) for a in x.tolist() for b in y.tolist()]
     tasks = [_Task(k, *closed(*place)) for k, place in enumerate(places)]
     found = run_tasks(_grown, tasks, executor, checkpoint, progress, "threshold")

@@ -31,7 +31,7 @@ def tried(drive, *swings, ends=None):
     return DriveTrials(
         drive,
         tuple(
-            Trial(start, Figures(end, swing, 0.0, 1.0, 1.0), stiff)
+            Trial(start, Figures(end, swing, 0.0, 1.0, 1.0), stiff, "under a stiff drive")
             for start, swing, end in zip(STARTS, swings, ends, strict=True)
         ),
     )
@@ -47,7 +47,7 @@ def test_what_swings_least_and_harms_from_no_start_is_best(drives):
     assert best_tried([calm, quiet]) is quiet
     back = tried(z, None, 0.1, 0.1, ends=[Outcome.TURNS_BACK, Outcome.ORBIT, Outcome.ORBIT])
     assert back.verdict.refused
-    assert "under a stiff drive" in back.verdict.reason
+    assert "; under a stiff drive" in back.verdict.reason
     assert best_tried([back, wild]) is wild
     # Of swings that are alike, what stands more.
     pair = [tried(soft, 0.10, 0.10, 0.10), tried(z, 0.11, 0.11, 0.11)]
@@ -64,6 +64,7 @@ def test_trials_are_runs_of_the_law_with_its_delay_and_limit(drives, monkeypatch
     monkeypatch.setattr("drillctrl.designs.drive_trials._PERIODS", 6.0)
     found = drive_trials(WHERE, drives[:1])[0]
     assert [trial.start.name for trial in found.trials] == ["small"]
+    assert {trial.beside for trial in found.trials} == {"under a stiff drive"}
     case, controller = law_controller(WHERE, drives[0].control)
     _, point = case.physics("a run")
     seconds = 6.0 / drives[0].modes[0].slope.mode_frequency
@@ -75,6 +76,31 @@ def test_trials_are_runs_of_the_law_with_its_delay_and_limit(drives, monkeypatch
     speed = point.omega0 + run.at(at, ("dtheta",)).dtheta
     swing = np.ptp(speed) / (2.0 * speed.mean())
     assert found.trials[0].controlled.swing == pytest.approx(swing, abs=0.01)
+
+
+def test_the_best_is_tried_out_of_a_stick_and_what_turns_back_no_further(drives, monkeypatch):
+    """Runs are made up: soft torque helps but out of a stick, Z-torque turns back from a kick."""
+    made = []
+
+    def run(task):
+        place, (_, law, start, _) = task
+        made.append((law.name, start.name))
+        swing = {"stiff": 0.4, "soft-torque": 0.1, "z-torque": 0.1}[law.name]
+        back = (law.name, start.name) in (("z-torque", "kick"), ("soft-torque", "stick"))
+        end = Outcome.TURNS_BACK if back else Outcome.ORBIT
+        return place, Figures(end, None if back else swing, 0.0, 1.0, 1.0)
+
+    monkeypatch.setattr("drillctrl.designs.drive_trials._run", run)
+    soft, z = drive_trials(WHERE, drives)
+    assert [trial.start.name for trial in soft.trials] == ["small", "kick", "back", "stick"]
+    assert [trial.start.name for trial in z.trials] == ["small", "kick"]
+    assert len(made) == len(set(made))
+    assert soft.verdict.recommended
+    assert "under the stiff drive: after a long stick the bit turns back" in soft.verdict.reason
+    assert soft.swing == 0.1
+    text = trials_text([soft, z], "a place")
+    assert "not run" in text
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_the_answer_of_a_dynamic_design_is_the_best_that_was_tried(monkeypatch):

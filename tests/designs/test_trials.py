@@ -232,7 +232,7 @@ BROKEN, TURNS, GROWS = (
     [
         (FINE, SWINGS, True, True, "settles from a small disturbance"),
         (SWINGS, SWINGS, False, False, "no measurable good"),
-        (SWINGS, SWINGS, True, False, "do not settle"),
+        (SWINGS, SWINGS, True, False, "does not settle"),
         (Figures(Outcome.ORBIT, 0.23, 0.0, 1.0, 1.0), SWINGS, False, False, "swings more"),
         (Figures(Outcome.ORBIT, 0.17, 0.0, 1.0, 1.0), SWINGS, False, True, "swings less"),
         (Figures(Outcome.STICK_SLIP, 0.2, 0.1, 1.0, 1.0), SWINGS, False, False, "sticks for 10 %"),

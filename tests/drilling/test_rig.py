@@ -100,6 +100,14 @@ def test_toml_round_trip_loses_nothing(tmp_path_factory, rig):
     assert load_rig(path) == rig
 
 
+def test_a_file_may_begin_with_a_mark_of_its_encoding(tmp_path):
+    """As Windows writes them."""
+    plain, marked = (tmp_path / name for name in ("plain.toml", "marked.toml"))
+    save_rig(table1(), plain)
+    marked.write_bytes(b"\xef\xbb\xbf" + plain.read_bytes())
+    assert load_rig(marked) == load_rig(plain)
+
+
 def test_a_bad_toml_file_is_refused_by_name(tmp_path):
     path = tmp_path / "rig.toml"
     save_rig(table1(), path)

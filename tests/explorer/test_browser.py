@@ -377,6 +377,11 @@ def test_a_driven_string_shows_what_its_drive_returns(page):
     page.keyboard.press("Shift+ArrowRight")
     shows(page, "reflection", "stiff,")
     assert page.is_hidden("#panel-nyquist")
+    # What is sketched while the hand moves is certified when it rests.
+    type_in(page, "#speed", "110")
+    says(page, "roots", "being checked")
+    until(page, "!document.querySelector('#verdict').textContent.includes('being checked')")
+    shows(page, "roots", "110 rpm")
 
 
 def test_a_window_changes_its_units_and_stays_where_it_is(window):

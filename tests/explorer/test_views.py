@@ -249,6 +249,16 @@ def test_a_driven_string_is_analysed_with_its_law():
     assert "--structure soft-torque" in found["command"]
 
 
+def test_a_sketch_of_the_roots_is_that_of_the_analysis():
+    """It comes first where analysing takes longer than a drag, and says that it is one."""
+    for state in (DRIVEN, CASE2):
+        sketch, whole = (ask("roots", state, **options)[0] for options in ({"rough": True}, {}))
+        assert sketch["rightmost"] == pytest.approx(whole["rightmost"], rel=1e-6)
+        assert sketch["sentence"] == f"{whole['sentence'][:-1]}; being checked …"
+        assert sketch["series"] == whole["series"]
+        assert "data" not in sketch
+
+
 def test_a_law_is_designed_once_for_all_points_of_a_rig():
     """Its design takes seconds, and each drag of the point asks for it."""
     state = {**DRIVEN, "structure": "observer-2", "K1": None}

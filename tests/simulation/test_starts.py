@@ -60,6 +60,30 @@ def test_a_string_is_wound_up_without_shaking():
     assert rate[2] == pytest.approx(-at(table1(), 120.0, 20.0).operating_point().omega0, rel=0.01)
 
 
+def test_from_rest_the_turning_of_the_top_goes_down_the_string():
+    where = at(string_preset("paper-string"), 120.0, 20.0)
+    unit = where.rig.time_scale
+    run = simulate(where, scenario=Scenario("rest"), duration=0.3 / unit, rtol=1e-6)
+    still, _ = run.structure.rest
+    top = -np.array([0.0, run.structure.penetration_rate, 0.0, run.structure.omega0])
+    arrays = run.structure.arrays
+    # Nothing accelerates before: no strain, no load.
+    rates = arrays.A @ still - arrays.E @ arrays.steady + arrays.T @ top
+    assert abs(rates[1::2]).max() < 1e-8 * abs(arrays.A @ still).max()
+    found = run.case.plant.string.resolved.torsion
+    names = ["dtheta", *(f"dtheta{i + 1}" for i in range(found.shapes.shape[1] - 2))]
+    motion = run.at([0.15 / unit], names)
+    moved = np.array([getattr(motion, name)[0] for name in names]) / unit
+    turning = where.rotary_speed + found.shapes[:, :-1] @ moved
+    depth = found.height[-1] - found.height
+    front = 0.15 * math.sqrt(77e9 / 8000.0)
+    behind = (depth > 50.0) & (depth < front - 150.0)
+    ahead = (depth > front + 150.0) & (depth < 950.0)
+    np.testing.assert_allclose(turning[behind], where.rotary_speed, rtol=0.03)
+    np.testing.assert_allclose(turning[ahead], 0.0, atol=0.03 * where.rotary_speed)
+    assert abs(1.0 + run.at([0.3 / unit]).dtheta[0] / run.structure.omega0) < 0.01
+
+
 def test_the_worst_is_told():
     calm = simulate_starts(HARMLESS, starts=("small", "kick"), duration=30.0, rtol=1e-6)
     assert calm.calm

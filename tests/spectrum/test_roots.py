@@ -236,3 +236,21 @@ def test_a_critically_damped_pair_without_delay_is_told():
     assert root.multiplicity == 2
     assert root.value == pytest.approx(np.trace(a0) / 2.0, rel=1e-7)
     assert spectral_abscissa(system) == pytest.approx(np.trace(a0) / 2.0, rel=1e-7)
+
+
+def test_roots_of_many_states_are_those_of_the_matrix_itself(monkeypatch):
+    """A chain of masses with a delayed push at its end, by both ways of telling its roots."""
+    n = 20
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    A0 = np.block([[np.zeros((n, n)), np.eye(n)], [-chain, -0.02 * chain]])
+    A1 = np.zeros((2 * n, 2 * n))
+    A1[-1, n - 1] = 0.3
+    system = DelaySystem(A0, (A1,), (1.3,), np.eye(2 * n)[:, :1], np.eye(2 * n)[:1])
+    quick = dominant_roots(system)
+    monkeypatch.setattr("drillctrl.spectrum.characteristic._FEW_STATES", 1000)
+    whole = dominant_roots(system)
+    assert len(quick) == len(whole) > 3
+    for one, other in zip(quick, whole, strict=True):
+        assert one.value == pytest.approx(other.value, abs=1e-12)
+        assert one.condition == pytest.approx(other.condition, rel=1e-6)
+        assert one.residual < 1e-14

@@ -84,6 +84,9 @@ def test_a_run_under_a_law_of_the_drive_is_that_of_the_law(call):
         ((*WHERE, "--structure", "stiff", "--measurement-delay", "20"), "--measurement-delay"),
         (("--structure", "stiff"), "--rig"),
         (("--rig", "paper-string", *WHERE[2:], "--structure", "stiff"), "[top_drive]"),
+        (("--rig", "paper-string", *WHERE[2:], "--structure", "constant-torque"), "[top_drive]"),
+        (("--structure", "constant-torque"), "--rig"),
+        ((*WHERE, "--K1", "1"), "--structure"),
     ],
 )
 def test_what_does_not_fit_a_run_under_a_drive_is_said_in_one_line(call, arguments, message):
@@ -91,6 +94,28 @@ def test_what_does_not_fit_a_run_under_a_drive_is_said_in_one_line(call, argumen
     assert (code, said) == (2, "")
     assert message in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "verb", [("simulate", "--duration", "0.1 s"), ("analyze",)], ids=lambda verb: verb[0]
+)
+def test_a_top_drive_is_stiff_where_no_law_is_named(call, tmp_path, verb):
+    rig = tmp_path / "rig.toml"
+    rig.write_text(PIPE.replace("900 m", "300 m") + '[top_drive]\ninertia = "2900 kg*m^2"\n')
+    where = ("--rig", rig, *WHERE[2:])
+    code, said, error = call(*verb, *where, "--json")
+    assert code == 0
+    assert "top drive is stiff" in error
+    stiff, constant = (
+        json.loads(call(*verb, *where, "--json", "--structure", law)[1])
+        for law in ("stiff", "constant-torque")
+    )
+    fields = json.loads(said)
+    for each in (fields, stiff, constant):
+        del each["elapsed_seconds"]
+    assert fields == stiff
+    assert constant["structure"] is None
+    assert constant != stiff
 
 
 def test_shapes_of_modes(call, tmp_path):

@@ -239,3 +239,12 @@ def test_friction_that_is_not_whole_is_refused(tmp_path, line, named):
     path.write_text(path.read_text() + line + "\n")
     with pytest.raises(InputError, match=named):
         load_rig(path)
+
+
+def test_a_run_goes_on_with_its_friction(rubbed):
+    run, unit = rubbed
+    times = np.linspace(4.1, 7.9, 20) / unit
+    past = Scenario(swing(RUBBED, duration=4.0)[0].past())
+    rest = simulate(off_rock(RUBBED)[0], scenario=past, duration=4.0 / unit, rtol=1e-6)
+    after = rest.at(times - 4.0 / unit).theta
+    np.testing.assert_allclose(after, run.at(times).theta, atol=1e-6)

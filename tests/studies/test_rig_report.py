@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import re
 from dataclasses import replace
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 
 from drillctrl import InputError, RigPoint, cli, load_rig, rig_report, table1
 from drillctrl.base.language import FIELD
+from drillctrl.cli.report import _date as printed_date
 from drillctrl.studies.rig_report_figure import plot_thresholds
 
 POINT = RigPoint(table1(), 150 * pi / 30, 20 / 3600)
@@ -120,6 +122,14 @@ def test_bad_input_is_named(tmp_path, monkeypatch, options, blamed):
     with pytest.raises(InputError, match=f"^{blamed} "):
         CliRunner().invoke(cli.cli, ["report", *options], catch_exceptions=False)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_date_is_printed_only_where_it_is_asked_for(monkeypatch):
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    assert printed_date(None) == ""
+    assert printed_date("spud") == "spud"
+    apart = datetime.date.fromisoformat(printed_date("today")) - datetime.date.today()
+    assert abs(apart.days) <= 1
 
 
 def test_the_verb_writes_the_page_and_one_object(tmp_path, monkeypatch):

@@ -17,6 +17,7 @@ from drillctrl import (
     InputError,
     RigPoint,
     Section,
+    as_case,
     changed_rig,
     drive_control,
     drive_table,
@@ -25,12 +26,17 @@ from drillctrl import (
     simulate,
     string_rig,
     table1,
+    torsional_modes,
     torsional_threshold,
     vibration_map,
 )
+from drillctrl.charts.plane import make_plane
 from drillctrl.cli import main
+from drillctrl.motion.response import BitResponse
+from drillctrl.motion.swing import ModeAt
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.starts import start_named
+from drillctrl.studies.vibration_threshold import torsional_field
 
 STRING = DrillString(
     (
@@ -153,6 +159,27 @@ def test_torsion_loses_its_damping_where_the_threshold_along_speed_has_it():
     assert found.to_dict()["threshold"]["grows"][0][0] == [True, True]
 
 
-def test_a_string_of_sections_has_no_threshold():
+def test_a_string_under_a_drive_has_no_threshold():
     with pytest.raises(InputError, match="threshold"):
         vibration_map(POINT, SPEED, ROP, threshold=True, **QUICK)
+
+
+def test_a_string_of_sections_has_one_at_fewer_points(monkeypatch):
+    """Its bit takes ten seconds to answer; here it takes so much damping at once."""
+    taken = 0.5
+
+    def answered(case, mode, swing, **options):
+        none = np.zeros(0, complex)
+        response = BitResponse(mode.root.imag, swing, -taken, 0.0, none, none, 1.0, 1.0, 0, 0, 1)
+        return ModeAt(response, mode.with_response(-taken), 0.0)
+
+    monkeypatch.setattr("drillctrl.studies.vibration_threshold.mode_at", answered)
+    alone = replace(POINT, rig=replace(RIG, drive=None))
+    case = as_case(alone)
+    plane = make_plane(case, SPEED, ROP, None, None, None)
+    found = torsional_field(plane, (30, 20), lambda x, y: (plane.case_at(x, y), (None,)))
+    (growth,) = found.growth
+    assert growth.shape == (7, 5)
+    (mode,) = torsional_modes(case)
+    wanted = mode.with_response(-taken).real / alone.rig.time_scale
+    np.testing.assert_allclose(growth, wanted)

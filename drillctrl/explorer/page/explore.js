@@ -348,6 +348,7 @@ function drawRoots(result) {
       return { name: s.name, x: s.x, y: s.y, points: last ? "x" : "o", colour: last ? COLOURS[0] : COLOURS[4] };
     }),
   });
+  if (result.rough) checkSoon();
   panels.roots.tell(result.sentence);
   const verdict = byId("verdict");
   if (verdict.textContent !== result.sentence) verdict.textContent = result.sentence;
@@ -509,7 +510,7 @@ function drawnStrings(rows) {
     make("text", { x: LEFT - 8, y: y(value) + 4.5, "text-anchor": "end" }, svg, short(value));
     make("line", { x1: LEFT - 5, x2: LEFT, y1: y(value), y2: y(value), stroke: "#1a1a1a" }, svg);
   }
-  make("text", { transform: `translate(14 ${height / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, `depth [${unitOf("depth")}]`);
+  make("text", { x: 4, y: 14 }, svg, `depth [${unitOf("depth")}]`);
   drawn.forEach((row, k) => {
     const middle = LEFT + room * (k + 0.5);
     let top = 0;
@@ -551,7 +552,11 @@ byId("find").addEventListener("click", () => {
 // ---------------------------------------------------------------- what follows what
 
 const follow = {
-  roots: new Follower(panels.roots, "roots", () => ({}), drawRoots),
+  // Analysing a string of pipe takes longer than a drag: its roots are sketched first.
+  roots: new Follower(panels.roots, "roots", () => ({ rough: !known.lumped }), drawRoots),
+  checked: new Follower(panels.roots, "roots", () => { checkedOf = lastPoint; return {}; }, result => {
+    if (checkedOf === lastPoint) drawRoots(result);
+  }),
   nyquist: new Follower(panels.nyquist, "nyquist", () => ({}), drawNyquist),
   reflection: new Follower(panels.reflection, "reflection", () => ({}), drawReflection),
   motion: new Follower(panels.motion, "motion", motionOptions, drawMotion),
@@ -563,6 +568,13 @@ const follow = {
     if (!alone && !known.drive && free === null) askFree();
   }),
 };
+// The point rests: what was sketched is sharpened, counted and certified.
+let checkedOf = "", resting = 0;
+function checkSoon() {
+  clearTimeout(resting);
+  panels.roots.busy("checking …", follow.checked);
+  resting = setTimeout(() => follow.checked.poke(), 250);
+}
 async function askFree() {
   free = false;
   const key = freeFor;

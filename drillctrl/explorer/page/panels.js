@@ -62,10 +62,13 @@ class Panel {
       element("details", {}, element("summary", {}, "Command line and Python"), this.command, this.python));
     document.getElementById("panels").append(this.section);
     this.columns = null;
+    this.works = new Map();
   }
-  busy(words) {
-    this.section.setAttribute("aria-busy", words ? "true" : "false");
-    this.state.textContent = words || "";
+  // Who works for this panel says what; it is busy until the last of them has done.
+  busy(words, who = this) {
+    if (words) this.works.set(who, words); else this.works.delete(who);
+    this.section.setAttribute("aria-busy", this.works.size ? "true" : "false");
+    this.state.textContent = [...this.works.values()].pop() || "";
   }
   tell(text, wrong) {
     if (this.says.textContent !== text) this.says.textContent = text;
@@ -109,7 +112,7 @@ class Follower {
   }
   async run() {
     this.running = true;
-    const late = setTimeout(() => this.panel.busy("working …"), 150);
+    const late = setTimeout(() => this.panel.busy("working …", this), 150);
     do {
       this.again = false;
       this.stop = new AbortController();
@@ -123,7 +126,7 @@ class Follower {
       }
     } while (this.again);
     clearTimeout(late);
-    this.panel.busy("");
+    this.panel.busy("", this);
     this.running = false;
   }
 }
