@@ -66,23 +66,34 @@ class OtherRig:
 
     def toml(self, stiffer=1.0, heavier=1.0):
         """Return a rig file that drillctrl reads, its pipe and collars off by these factors."""
-        shear, density = 79.3e9 * stiffer, 7850.0 * heavier
-        rows = "".join(
-            f'[[sections]]\nname = "{name}"\ntype = "{kind}"\nlength = "{size} m"\n'
-            f'outer_diameter = "{outer} m"\ninner_diameter = "{inner} m"\n'
-            f'shear_modulus = "{shear} Pa"\ndensity = "{density} kg/m^3"\n'
-            for name, kind, size, outer, inner in (
-                ("pipe", "pipe", self.length, *self.pipe),
-                ("collars", "collar", *self.collars),
-            )
-        )
-        return rows + (
-            '[bit]\ndiameter = "0.216 m"\nblades = 4\nwearflat_length = "1.2 mm"\n'
-            "cutter_inclination = 0.6\nfriction_coefficient = 0.6\ngeometry = 1.0\n"
-            '[rock]\nstrength = "60 MPa"\ncontact_strength = "60 MPa"\n'
-            f'[top_drive]\ninertia = "{self.drive} kg*m^2"\n'
-            "[damping]\ntorsional = 0.15\nkelvin_voigt = 1e-3\n"
-        )
+        parts = (("pipe", "pipe", self.length, *self.pipe), ("collars", "collar", *self.collars))
+        text = rig_text(parts, 79.3e9 * stiffer, 7850.0 * heavier, self.drive, 0.15)
+        return text + "kelvin_voigt = 1e-3\n"
+
+
+def rig_text(parts, shear, density, drive, damping):
+    """Return a rig file of parts: name, type, length, outer and inner diameter."""
+    rows = "".join(
+        f'[[sections]]\nname = "{name}"\ntype = "{kind}"\nlength = "{size} m"\n'
+        f'outer_diameter = "{outer} m"\ninner_diameter = "{inner} m"\n'
+        f'shear_modulus = "{shear} Pa"\ndensity = "{density} kg/m^3"\n'
+        for name, kind, size, outer, inner in parts
+    )
+    return rows + (
+        '[bit]\ndiameter = "0.216 m"\nblades = 4\nwearflat_length = "1.2 mm"\n'
+        "cutter_inclination = 0.6\nfriction_coefficient = 0.6\ngeometry = 1.0\n"
+        '[rock]\nstrength = "60 MPa"\ncontact_strength = "60 MPa"\n'
+        f'[top_drive]\ninertia = "{drive} kg*m^2"\n[damping]\ntorsional = {damping}\n'
+    )
+
+
+def measured(random, speed, torque, noise, steps):
+    """Return rpm and N m with noise, rounded to steps where these are not zero."""
+    found = []
+    for data, size, step in zip((speed / RPM, torque), noise, steps, strict=True):
+        data = data + size * random.standard_normal(data.size)
+        found.append(step * np.round(data / step) if step else data)
+    return found
 
 
 @numba.njit(cache=True)
@@ -181,12 +192,7 @@ def recorded(
         dt,
         lag,
     )
-    top = out[:, 0] / RPM + noise[0] * random.standard_normal(count)
-    torque = out[:, 1] + noise[1] * random.standard_normal(count)
-    if steps[0]:
-        top = steps[0] * np.round(top / steps[0])
-    if steps[1]:
-        torque = steps[1] * np.round(torque / steps[1])
+    top, torque = measured(random, out[:, 0], out[:, 1], noise, steps)
     return np.arange(count) / rate, top, torque, out[:, 2] / RPM
 
 

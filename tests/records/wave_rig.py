@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-RPM = np.pi / 30.0
+from tests.records.other_rig import RPM, measured, rig_text
+
 DENSITY, SHEAR = 7850.0, 79.3e9
 _STEP = 1e-3
 
@@ -59,21 +60,11 @@ class WaveRig:
         (n, _), (m, collar) = self.cells()
         size = np.sqrt(SHEAR / DENSITY) * _STEP
         longer = 1.0 + self.bit / (collar * m * _STEP)
-        rows = "".join(
-            f'[[sections]]\nname = "{name}"\ntype = "{kind}"\nlength = "{long} m"\n'
-            f'outer_diameter = "{outer} m"\ninner_diameter = "{inner} m"\n'
-            f'shear_modulus = "{SHEAR * stiffer} Pa"\ndensity = "{DENSITY * heavier} kg/m^3"\n'
-            for name, kind, long, outer, inner in (
-                ("pipe", "pipe", n * size, *self.pipe),
-                ("collars", "collar", m * size * longer, *self.collars[1:]),
-            )
+        parts = (
+            ("pipe", "pipe", n * size, *self.pipe),
+            ("collars", "collar", m * size * longer, *self.collars[1:]),
         )
-        return rows + (
-            '[bit]\ndiameter = "0.216 m"\nblades = 4\nwearflat_length = "1.2 mm"\n'
-            "cutter_inclination = 0.6\nfriction_coefficient = 0.6\ngeometry = 1.0\n"
-            '[rock]\nstrength = "60 MPa"\ncontact_strength = "60 MPa"\n'
-            f'[top_drive]\ninertia = "{self.drive} kg*m^2"\n[damping]\ntorsional = {damping}\n'
-        )
+        return rig_text(parts, SHEAR * stiffer, DENSITY * heavier, self.drive, damping)
 
 
 @numba.njit(cache=True)
@@ -202,10 +193,7 @@ def wave_recorded(
         0.2,
         lag,
     )
-    top = out[:, 0] / RPM + noise[0] * random.standard_normal(count)
-    torque = out[:, 1] + noise[1] * random.standard_normal(count)
-    top = steps[0] * np.round(top / steps[0])
-    torque = steps[1] * np.round(torque / steps[1])
+    top, torque = measured(random, out[:, 0], out[:, 1], noise, steps)
     time = np.arange(count) / rate
     kept = np.ones(count, dtype=bool)
     for i in range(gaps):
