@@ -44,7 +44,7 @@ _SWING = 0.04
 
 
 def begun_in(case, mode):
-    """Return the states in which a string swings in a mode; its bit alone weighs next to nothing."""
+    """Return the states in which a string swings in a mode: its bit alone weighs almost nothing."""
     matrix, _, places = torsional_states(case)
     roots, shapes = np.linalg.eig(matrix)
     shape = shapes[:, np.argmin(np.abs(roots - mode.root))]
