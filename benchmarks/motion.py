@@ -28,6 +28,7 @@ from drillctrl import (
 )
 from drillctrl.designs.controlled_swings import controlled_swings
 from drillctrl.designs.swings import measured_swings
+from drillctrl.motion.torsion import torsional_states
 from drillctrl.strings.rig import lumped_values
 
 _WINDOW = 4.0
@@ -38,19 +39,28 @@ _SIGN, _NEAR, _SHARE = 0.008, 0.005, 0.25
 
 # An error of a rate, per unit of time, at which nothing is told of it.
 _UNSURE = 0.02
-# Swing at the beginning, time before the first window and of a run: of Table 1, and of a string,
-# whose kick spreads over its modes.
-_LUMPED, _STRING = (0.04, 10.0, 120.0), (0.08, 6.0, 160.0)
+# Of the bit's speed at the beginning.
+_SWING = 0.04
 
 
-def measured_rate(case, controller, frequency, begun=_LUMPED):
+def begun_in(case, mode):
+    """Return the states in which a string swings in a mode: its bit alone weighs almost nothing."""
+    matrix, _, places = torsional_states(case)
+    roots, shapes = np.linalg.eig(matrix)
+    shape = shapes[:, np.argmin(np.abs(roots - mode.root))]
+    plant, point = case.physics("a mode")
+    values = (shape / shape[1]).real * _SWING * point.omega0
+    return {plant.state_names[i]: value for i, value in zip(places, values.tolist(), strict=True)}
+
+
+def measured_rate(case, controller, frequency, initial=None):
     """Return the growth rate of the bit's swing at a frequency, None where it shows none."""
     _, point = case.physics("a rate")
-    swing, since, duration = begun
-    initial = {"dx": 0.1 * point.penetration_rate, "dtheta": swing * point.omega0}
-    run = simulate(case, controller, duration=duration, initial=initial, backwards="stop")
+    initial = initial or {"dtheta": _SWING * point.omega0}
+    initial = {"dx": 0.1 * point.penetration_rate, **initial}
+    run = simulate(case, controller, duration=120.0, initial=initial, backwards="stop")
     length = _WINDOW * 2.0 * math.pi / frequency
-    begins = np.arange(since, float(run.times[-1]) - length, 0.25 * length)
+    begins = np.arange(10.0, float(run.times[-1]) - length, 0.25 * length)
     if begins.size < 4:
         return None
     sizes = []
@@ -98,7 +108,7 @@ def string_point(rng, name):
     at = mode_at(case, mode, 0.03, most_periods=40)
     if at.error > _UNSURE:
         return text, at.root.real, at.error, None
-    rate = measured_rate(case, None, at.root.imag, _STRING)
+    rate = measured_rate(case, None, at.root.imag, begun_in(case, mode))
     return text, at.root.real, at.error, rate
 
 
