@@ -118,7 +118,7 @@ def setting(seed: int) -> tuple[Case, Controller | None, dict[str, Any]]:
     case, controller = (tally if string else lumped)(rng)
     _, point = case.physics("a campaign")
     start, kick = pick(rng, STARTS), rng.uniform(-0.9, 0.9)
-    scenario = start_named(start).scenario(point)
+    scenario = start_named(start).scenario()
     if rng.random() < 0.3:
         scenario = Scenario("steady", {"dtheta": kick * point.omega0})
     options = {

@@ -161,7 +161,7 @@ def read_scenario(
         return Scenario(start, kick, later)
     if initial is not None:
         raise InputError("--initial", initial, f"left out with --start {start}")
-    return start_named(start).scenario(point, later)
+    return start_named(start).scenario(later)
 
 
 def read_starts(text: str, possible: tuple[str, ...]) -> tuple[str, ...]:

@@ -153,12 +153,11 @@ def law_is_quiet(where: RigPoint, drive: DriveMeasures, most: float) -> bool:
 def _run(task: tuple[int, tuple[RigPoint, DriveControl, Start, float]]) -> tuple[int, Figures]:
     place, (where, control, start, seconds) = task
     case, controller = law_controller(where, control)
-    _, point = case.physics("a trial run")
     run = simulate(
         case,
         controller,
         duration=seconds / where.rig.time_scale,
-        scenario=start.scenario(point),
+        scenario=start.scenario(),
         rtol=_RTOL,
         max_steps=_STEPS,
         backwards="stop",

@@ -105,7 +105,7 @@ def _run(case: Case, controller: Controller | None, start: Start, rtol: float) -
         case,
         controller,
         duration=start.activation + trial_duration(point),
-        scenario=start.scenario(point),
+        scenario=start.scenario(),
         rtol=rtol,
         max_steps=_STEPS,
         backwards="stop",
@@ -118,7 +118,7 @@ def standing_starts(case: Case) -> tuple[Start, ...]:
     structure, found = structure_of(case), []
     for start in STANDING:
         try:
-            check_start(point, structure, start.scenario(point), False)
+            check_start(point, structure, start.scenario(), False)
         except InputError:
             # A drive that is free to turn holds nothing.
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -184,15 +185,59 @@ def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatAr
     InputError
         If such a motion does not exist.
     """
-    n = arrays.A.shape[0]
     c = Coefficients(*arrays.q[: len(Coefficients._fields)])
+    a, b = _led(arrays, -c.penetration_rate, -c.rotary_speed)
+    return a, a + time * b
+
+
+def kicked_states(
+    arrays: MotionArrays, names: tuple[str, ...], axial: float, rotary: float
+) -> FloatArray:
+    """Return by how much all of a string moves faster whose bit is kicked, (n,).
+
+    A bit alone has next to no inertia of a long string: what it is given is gone at once. So the
+    string moves with it as if the bit were led slowly, and its top end goes on as it did.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the states.
+    axial, rotary : float
+        What the bit moves faster by.
+    """
+    moving = [names.index(f"d{name}") for name in names if f"d{name}" in names]
+    held = [names.index(name) for name in ("phi", "dphi") if name in names]
+    kick = np.zeros(len(arrays.A))
+    for own, speeds in ((1, (axial, 0.0)), (3, (0.0, rotary))):
+        if speeds == (0.0, 0.0):
+            continue
+        try:
+            led, _ = _led(arrays, *speeds, held=held)
+        except InputError:
+            led = np.zeros_like(kick)
+            led[own] = sum(speeds)
+        felt = np.abs(led) > 1e-9 * np.abs(led[moving]).max()
+        kick[moving] += np.where(felt, led, 0.0)[moving]
+    return kick
+
+
+def _led(
+    arrays: MotionArrays, axial: float, rotary: float, held: Sequence[int] = ()
+) -> tuple[FloatArray, FloatArray]:
+    """Return a and b of X = a + b t where the bit is led at constant speeds.
+
+    The states ``held`` stay as they are, whatever that takes.
+    """
+    n = arrays.A.shape[0]
     # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known: both powers of
     # t at once, since a state that integrates takes its rate from the other.
-    fixed, free = np.arange(4), np.arange(4, n)
+    fixed = np.array([*range(4), *held])
+    free = np.setdiff1d(np.arange(n), fixed)
     b, a = np.zeros(n), np.zeros(n)
-    b[[0, 2]] = a[[1, 3]] = -c.penetration_rate, -c.rotary_speed
-    loaded = np.hstack([arrays.A[:, free], arrays.E])
-    own = np.hstack([np.eye(n)[:, free], np.zeros_like(arrays.E)])
+    b[[0, 2]] = a[[1, 3]] = axial, rotary
+    forces = np.hstack([arrays.E, np.eye(n)[:, list(held)]])
+    loaded = np.hstack([arrays.A[:, free], forces])
+    own = np.hstack([np.eye(n)[:, free], np.zeros_like(forces)])
     unknown = np.block([[loaded, np.zeros_like(loaded)], [-own, loaded]])
     wanted = -np.concatenate([arrays.A[:, fixed] @ b[fixed], arrays.A[:, fixed] @ a[fixed] - b])
     found, *_ = np.linalg.lstsq(unknown, wanted, rcond=None)
@@ -200,7 +245,7 @@ def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatAr
         raise InputError("start", "stick", "steady where the string has no such motion")
     rates, places = np.split(found, 2)
     b[free], a[free] = rates[: free.size], places[: free.size]
-    return a, a + time * b
+    return a, b
 
 
 def rest_states(arrays: MotionArrays, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:

@@ -47,13 +47,12 @@ def motion(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
         raise InputError("start", str(start)[:40], f"one of {', '.join(START_NAMES)}")
     length = seconds / asked.time_scale
     case, controller = asked.run()
-    _, point = case.physics("a motion")
     tell(0.0, seconds, "simulating")
     run = simulate(
         case,
         controller,
         duration=length,
-        scenario=start_named(start).scenario(point),
+        scenario=start_named(start).scenario(),
         time_limit=math.inf if patient else PATIENCE,
         progress=lambda time: tell(time * asked.time_scale, seconds, "simulating"),
     )

@@ -220,7 +220,7 @@ def check_start(
         motion of a top end changes on which inertia hangs, the linear model is to start from
         rest, or a run from the past of another point, plant or model.
     """
-    kick = scenario.perturbation(structure.state_names)
+    kick = _added(structure, scenario)
     feed_hangs, turn_hangs = (structure.arrays.drag[:, k].any() for k in range(2))
     for change in scenario.changes:
         for name, hangs in (("penetration_rate", feed_hangs), ("omega0", turn_hangs)):
@@ -271,7 +271,7 @@ def begin(
     )
     _, history, ints, reals, y, chain, _, first = standing
     n, m = structure.arrays.B.shape
-    kick = scenario.perturbation(structure.state_names)
+    kick = _added(structure, scenario)
     y[:n] += kick
     if kick[1]:
         ints[march.I_AXIAL] = data.DOWN
@@ -294,6 +294,12 @@ def begin(
     work = march.workplace(settings)
     march.enter(settings, history, first, ints, reals, chain, data.BEGIN, 0.0, y, work)
     return standing
+
+
+def _added(structure: Structure, scenario: Scenario) -> FloatArray:
+    """Return what is added to the states at t = 0, (n,)."""
+    added = scenario.perturbation(structure.state_names)
+    return added + structure.kicked(*scenario.kick) if any(scenario.kick) else added
 
 
 def _blank(structure: Structure, settings: data.Settings, room: int) -> March:

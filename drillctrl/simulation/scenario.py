@@ -69,8 +69,12 @@ class Scenario:
         (`Simulation.past`).
     initial : mapping
         Perturbation by state name (x, dx, theta, dtheta of the bit) that is added at t = 0.
+        The bit of a long string has next to no inertia of its own; see ``kick``.
     changes : tuple of Change
         In order of time, none starting before the one before it is complete.
+    kick : (float, float)
+        By which shares of V0 and Ω0 the bit moves faster at t = 0, beside ``initial``, and with
+        it the string: as if the bit were led slowly, its top end unmoved.
 
     Raises
     ------
@@ -81,8 +85,11 @@ class Scenario:
     start: str | Past = "steady"
     initial: Mapping[str, float] = field(default_factory=dict)
     changes: tuple[Change, ...] = ()
+    kick: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        for share in self.kick:
+            checked_number("kick", share, -1e3, 1e3)
         if not isinstance(self.start, Past) and self.start not in STARTS:
             raise InputError("start", self.start, f"one of {', '.join(STARTS)}, or a Past")
         for name, value in self.initial.items():

@@ -12,7 +12,6 @@ from typing import Any
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
-from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.layout import check_start
 from drillctrl.simulation.outcome import Figures, figures
@@ -33,7 +32,8 @@ class Start:
     begin : {"steady", "rest", "stick"}
         As ``start`` of a `Scenario`.
     feed, speed : float
-        Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0.
+        Perturbation of the axial rate as a share of V0, and of the bit's speed as one of Ω0; a
+        string moves with its bit, see ``kick`` of `Scenario`.
     text : str
         In words.
     activation : float
@@ -47,15 +47,9 @@ class Start:
     text: str = ""
     activation: float = 0.0
 
-    def initial(self, point: OperatingPoint) -> dict[str, float]:
-        """Return the perturbation by state name."""
-        if self.begin != "steady":
-            return {}
-        return {"dx": self.feed * point.penetration_rate, "dtheta": self.speed * point.omega0}
-
-    def scenario(self, point: OperatingPoint, changes: tuple[Change, ...] = ()) -> Scenario:
+    def scenario(self, changes: tuple[Change, ...] = ()) -> Scenario:
         """Return the scenario that begins so."""
-        return Scenario(self.begin, self.initial(point), changes)
+        return Scenario(self.begin, changes=changes, kick=(self.feed, self.speed))
 
 
 STARTS = (
@@ -158,7 +152,7 @@ def possible_starts(where: Where, linear: bool = False) -> tuple[str, ...]:
     names = []
     for start in STARTS:
         try:
-            check_start(point, structure, start.scenario(point), linear)
+            check_start(point, structure, start.scenario(), linear)
         except InputError:
             continue
         names.append(start.name)
@@ -185,7 +179,7 @@ def start_runs(
         wanted = f"some of {', '.join(START_NAMES)}, each once"
         raise InputError("starts", ", ".join(names), wanted)
     structure = structure_of(case)
-    scenarios = [start_named(name).scenario(point, changes) for name in names]
+    scenarios = [start_named(name).scenario(changes) for name in names]
     for scenario in scenarios:
         check_start(point, structure, scenario, linear)
     for name, scenario in zip(names, scenarios, strict=True):
@@ -209,10 +203,10 @@ def simulate_starts(
     where, controller
         As in `simulate`.
     starts : sequence of str
-        Some of ``"small"``: 5 % of V0 and 10 % of Ω0; ``"kick"``, ``"back"``: half of V0, and
-        of Ω0 forward or back; ``"rest"``: a bit at rest that touches flat rock; ``"stick"``: a
-        bit that has stood still in the rock while the top end went on. By default all that
-        the string has.
+        Some of ``"small"``: 5 % of V0 and 10 % of Ω0 at the bit, with which a string moves;
+        ``"kick"``, ``"back"``: half of V0, and of Ω0 forward or back; ``"rest"``: a bit at rest
+        that touches flat rock; ``"stick"``: a bit that has stood still in the rock while the top
+        end went on. By default all that the string has.
     changes : tuple of Change
         Of drive and rock on the way, from every start.
     **options

@@ -16,6 +16,7 @@ from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.motion import (
     BIT_COEFFICIENTS,
     MotionArrays,
+    kicked_states,
     load_function,
     rest_states,
     stuck_states,
@@ -89,6 +90,11 @@ class Structure:
     def stuck(self, time: float) -> tuple[FloatArray, FloatArray]:
         """States of a string whose bit stands still: at first, and so long after, (n,) each."""
         return stuck_states(self.arrays, time)
+
+    def kicked(self, feed: float, speed: float) -> FloatArray:
+        """What a kick of the bit by these shares of V0 and Ω0 adds to the states, (n,)."""
+        axial, rotary = feed * self.penetration_rate, speed * self.omega0
+        return kicked_states(self.arrays, self.state_names, axial, rotary)
 
 
 @dataclass(frozen=True)

@@ -221,7 +221,7 @@ def _course(task: _Task) -> tuple[int, Course]:
         task.case,
         task.controller,
         duration=task.seconds / rig.time_scale,
-        scenario=start.scenario(point),
+        scenario=start.scenario(),
         rtol=_RTOL,
     )
     times = np.linspace(0.0, float(run.times[-1]) * (1.0 - 1e-12), _SAMPLES)

@@ -84,7 +84,7 @@ def _way(task: CellTask, here: FloatArray, there: FloatArray) -> tuple[Case, Sce
     changes = [Change(_BEFORE, _RAMP, omega0=goal.omega0, penetration_rate=goal.penetration_rate)]
     if goal.psi != point.psi:
         changes.append(Change(_BEFORE + _RAMP + _AFTER, psi=goal.psi))
-    scenario = STARTS[0].scenario(point, tuple(changes))
+    scenario = STARTS[0].scenario(tuple(changes))
     return case, scenario, _BEFORE + _RAMP + _AFTER + trial_duration(goal)
 
 

@@ -70,7 +70,7 @@ def test_trials_are_runs_of_the_law_with_its_delay_and_limit(drives, monkeypatch
     seconds = 6.0 / drives[0].modes[0].slope.mode_frequency
     run = simulate(
         case, controller, duration=seconds / RIG.time_scale,
-        scenario=STARTS[0].scenario(point), rtol=1e-7,
+        scenario=STARTS[0].scenario(), rtol=1e-7,
     )  # fmt: skip
     at = np.linspace(0.75, 1.0, 3000) * run.times[-1]
     speed = point.omega0 + run.at(at, ("dtheta",)).dtheta

@@ -160,3 +160,28 @@ def test_feedback_that_looks_back_into_the_stick(feedback):
 
     wanted = -0.3 * angle(at - late) + 0.4 * angle(at - late - point.delay)
     np.testing.assert_allclose(run.at(at, ("torque",)).torque, wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["paper-string", "vertical-3000"])
+def test_a_kick_moves_a_string_with_its_bit(name):
+    """A bit alone gives its speed away at once; kicked with its string it swings back."""
+    case = as_case(at(string_preset(name), 120.0, 10.0))
+    structure = structure_of(case)
+    kick = structure.kicked(0.3, 0.5)
+    assert kick[[1, 3]] == pytest.approx([0.3 * structure.penetration_rate, 0.5 * structure.omega0])
+    place = structure.state_names.index
+    assert not kick[
+        [place(n) for n in structure.state_names if f"d{n}" in structure.state_names]
+    ].any()
+    if name == "vertical-3000":
+        assert kick[place("dphi")] == 0.0
+    swings = []
+    for scenario in (
+        Scenario(kick=(0.0, 0.5)),
+        Scenario(initial={"dtheta": 0.5 * structure.omega0}),
+    ):
+        run = simulate(case, duration=5.0, scenario=scenario, rtol=1e-5)
+        later = run.at(np.linspace(1.0, 5.0, 200)).dtheta / structure.omega0
+        swings.append(float(np.abs(later).max()))
+    assert 0.25 < swings[0] < 0.5
+    assert swings[1] < 0.02

@@ -69,7 +69,7 @@ def test_each_column_is_what_runs_under_its_law_do(found, column, law):
     k = next(i for i in range(4) if (columns["speed"][i], columns["rop"][i]) == (80.0, 15.0))
     where = RigPoint(RIG, 80 * pi / 30, 15 / 3600)
     case, controller = law_controller(where, drive_control(law, RIG))
-    start = start_named("kick").scenario(where.operating_point())
+    start = start_named("kick").scenario()
     run = simulate(case, controller, duration=30.0, scenario=start, rtol=1e-6)
     assert columns[f"{column}swing"][k] == pytest.approx(figures(run).swing, rel=1e-6)
     assert columns[f"{column}outcome"][k] == str(figures(run).outcome)
@@ -109,7 +109,7 @@ def test_laws_of_a_table_are_those_of_each_depth(tmp_path):
     k = next(i for i, at in enumerate(found.points.tolist()) if at == [80.0, 420.0])
     deep = RigPoint(changed_rig(RIG, depth=420.0), 80 * pi / 30, 10 / 3600)
     case, controller = law_controller(deep, made.drives[1].control)
-    start = start_named("kick").scenario(deep.operating_point())
+    start = start_named("kick").scenario()
     run = simulate(case, controller, duration=10.0, scenario=start, rtol=1e-6)
     assert found.controlled.swing[k] == pytest.approx(figures(run).swing, rel=1e-6)
     with pytest.raises(InputError, match="table"):
