@@ -1,6 +1,7 @@
 """Points of the paper that several tests use, and how hypothesis draws."""
 
 import os
+from collections import Counter
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -20,9 +21,30 @@ settings.register_profile(
 settings.load_profile("drillctrl")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Let one process begin with the simulator: the other finds it compiled when it comes to it."""
-    items.sort(key=lambda item: item.path.parts[-2:] != ("simulation", "test_string.py"))
+    """Order and choose what runs.
+
+    The simulator, which compiles, comes first, beside what has no need of it. Of cases that are
+    marked ``long(but=1)`` the first is not.
+    """
+    rooms = ("spectrum", "charts", "delay", "base", "robustness", "synthesis")
+    seen = Counter()
+
+    def turn(item):
+        room, name = item.path.parts[-2:]
+        if (room, name) == ("simulation", "test_string.py"):
+            return 0
+        return 1 if room in rooms else 2
+
+    for item in items:
+        mark = item.get_closest_marker("long")
+        if mark is not None:
+            which = item.path, item.originalname
+            seen[which] += 1
+            if seen[which] <= mark.kwargs.get("but", 0):
+                item.own_markers = [own for own in item.own_markers if own.name != "long"]
+    items.sort(key=turn)
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
-from drillctrl.charts.sweep import sweep
+from drillctrl.charts.sweep import FIRST_LINES, sweep
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.case import Where
 from drillctrl.drilling.quantities import root_scales
@@ -205,12 +205,9 @@ def chart(
     held, scanned = (plane.y, plane.x) if rows else (plane.x, plane.y)
     start = first_position(held)
     # Every line at a depth has a string of its own, which costs.
-    if held.name == "depth":
-        result = sweep(
-            scanner, start, held.high, tolerance=tolerance, first=_STRINGS, narrowest=_NARROWEST
-        )
-    else:
-        result = sweep(scanner, start, held.high, tolerance=tolerance)
+    usual = {"first": FIRST_LINES}
+    lines = {"first": _STRINGS, "narrowest": _NARROWEST} if held.name == "depth" else usual
+    result = sweep(scanner, start, held.high, tolerance=tolerance, **lines)
     curves = stable_curves(result.lines, rows=rows)
     regions = label_regions(plane, result.lines, level, rows=rows)
     # Nothing is known of the strip that holds no line.

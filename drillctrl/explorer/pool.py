@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import multiprocessing
 import multiprocessing.connection
 import signal
@@ -153,4 +154,6 @@ def _work(connection: multiprocessing.connection.Connection) -> None:
 def _end(*_: object) -> None:
     """End this process once: who clears up already is not ended again."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    # Libraries may take the exit for an error of their own, of which nobody need hear.
+    sys.stderr = io.StringIO()
     sys.exit(1)

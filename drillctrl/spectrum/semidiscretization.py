@@ -17,7 +17,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.errors import InputError, UndecidedError, checked_integer
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem, low_rank_factors
 from drillctrl.spectrum.characteristic import magnitude_bound
@@ -109,7 +109,11 @@ class SemiDiscretization:
 
     def multipliers(self) -> ComplexArray:
         """Return the eigenvalues of D, largest modulus first."""
-        values = np.linalg.eigvals(self.matrix()).astype(complex)
+        matrix = self.matrix()
+        if not np.isfinite(matrix).all():
+            told = f"{self.P.shape[0]} states in steps of {self.step:g}"
+            raise UndecidedError("system", told, "one whose numbers are not too large for a step")
+        values = np.linalg.eigvals(matrix).astype(complex)
         return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property
