@@ -73,6 +73,7 @@ def test_weight_on_bit_instead_of_rate(capsys):
     assert points[0] == pytest.approx(points[1], rel=1e-6)
 
 
+@pytest.mark.long
 def test_require_stable(capsys):
     base = [
         "design",
@@ -346,6 +347,7 @@ def test_simulate_changes_and_a_table(capsys, tmp_path):
     assert json.loads(run(capsys, *arguments, "--json")[1])["settled"]
 
 
+@pytest.mark.long
 def test_simulate_multipliers_and_figures(capsys, tmp_path):
     for name in ("motion", "phase", "axial-phase", "linear", "face"):
         figure = tmp_path / f"{name}.png"
@@ -400,6 +402,7 @@ def test_simulate_refuses_before_it_compiles(capsys, tmp_path, monkeypatch):
         assert "compiling" not in err
 
 
+@pytest.mark.long
 def test_an_objective_and_a_requirement_on_the_command_line(capsys):
     point = ["design", "--structure", "case1", "--json", "--trials", "none"]
     _, exact, _ = run(capsys, *point)

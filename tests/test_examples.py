@@ -20,6 +20,7 @@ LONG = {"sticking_at_80_rpm.py"}
 SHORT = sorted(path for path in EXAMPLES.glob("*.py") if path.name not in LONG)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("path", SHORT, ids=lambda path: path.name)
 def test_example_runs(path, capsys):
     runpy.run_path(str(path), run_name="__main__")

@@ -38,6 +38,7 @@ def stranger(request):
     return case, design(case, structure, trials=False)
 
 
+@pytest.mark.long(but=1)
 def test_design_chart_and_report(stranger, monkeypatch):
     case, result = stranger
     # Where it stands is asked, not how large the area is.
@@ -75,6 +76,7 @@ def test_another_physics_than_the_gains_were_designed_for_is_refused(stranger):
         assert run.status == "done"
 
 
+@pytest.mark.long(but=1)
 def test_table_files_and_exports(stranger, tmp_path):
     case, result = stranger
     grid = dimensionless_grid(linear_axis("omega0", 9.0, 11.0, 2), 2.5, reference=case)
@@ -98,6 +100,7 @@ def test_table_files_and_exports(stranger, tmp_path):
     )
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("bit_or_string", [{"bit": VelocityWeakening()}, {"string": short_chain}])
 def test_compare(bit_or_string):
     case = as_case(POINT, paper_plant(**bit_or_string))

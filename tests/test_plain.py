@@ -48,6 +48,7 @@ def test_no_verb_is_forgotten():
     assert set(cli.commands) == {*VERBS, *ASKED_OTHERWISE, *LEFT_OUT}
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_rig_is_told_no_symbols(capsys, verb, tmp_path):
     words = VERBS[verb]

@@ -105,7 +105,7 @@ def table_command(
 
     \b
     Examples:
-      drillctrl table --omega0 4:24:21 --delta0 0.25:12:16 --psi 14 --out gains.csv
+      drillctrl table --omega0 4:24:11 --delta0 1:12:6 --psi 14 --out gains.csv
       drillctrl table --rig table1 --speed "140:260:7 rpm" --rop "10:60:6 m/h" --out gains.csv
       drillctrl table --omega0 8:20:5 --delta0 1:7:4 --out gains.c --period 0.01 --limit 5
       drillctrl table --rig table1 --speed "110:120:2 rpm" --rop "50 m/h" --structure pd \\

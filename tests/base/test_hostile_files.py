@@ -89,6 +89,7 @@ def test_all_verbs_are_there():
 
 
 # What an encoding lacks does not depend on the verb: each is run in one of them.
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("verb", "encoding"),
     [*zip(VERBS, itertools.cycle(["cp1252", "cp437", "latin-1"]), strict=False)],

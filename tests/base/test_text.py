@@ -30,6 +30,7 @@ def test_what_is_too_long_goes_on_below_its_beginning():
     assert "\N{NO-BREAK SPACE}" not in told
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -113,6 +113,7 @@ def test_display_units_come_back(value):
     assert units.to_si("x", f"{shown!r} rpm", units.ROTARY_SPEED) == pytest.approx(value)
 
 
+@pytest.mark.long
 @given(st.text(max_size=30))
 def test_any_text_is_either_a_number_or_an_input_error(text):
     try:

@@ -82,6 +82,7 @@ def test_open_loop_area_at_other_points(changes):
     )
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", GAINS)
 def test_area_for_given_gains(name):
     now, past = GAINS[name]
@@ -91,6 +92,7 @@ def test_area_for_given_gains(name):
     assert drawn.stable_area == pytest.approx(share * box((SPEEDS, DEPTHS)), rel=3e-3)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("axes", "name"),
     [
@@ -149,6 +151,7 @@ def test_regions_are_confirmed_by_the_argument_principle():
         assert total == pytest.approx(375.0, rel=0.03)
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None)
 @given(
     omega0=st.floats(0.6, 24.0),

@@ -36,6 +36,7 @@ def margin_at(point, name):
     return gain_margin(loop_family(plant_system(point), structure)), structure
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", ["p", "case1", "pd"])
 def test_margin_agrees_with_the_search_over_gains(name):
     rng = np.random.default_rng(2)
@@ -73,6 +74,7 @@ def test_line_where_p_ceases_to_help_follows_from_the_tangency():
             assert (family.abscissas(gains[:, None]).min() < 0.0) == possible
 
 
+@pytest.mark.long
 def test_chart_holds_the_open_loop_and_a_wider_box_holds_a_narrower_one():
     axes = SPEEDS, ("delta0", 0.0, 15.0)
     narrow = preset_structure("case1").with_bounds({"K1": (-2.0, 2.0), "K2": (-0.2, 0.2)})
@@ -94,6 +96,7 @@ def test_low_speeds_are_said_to_be_undecided():
     assert "undecided" in drawn.summary()
 
 
+@pytest.mark.long
 def test_four_gains_reach_further_each_stable_place_proved():
     narrow = ("omega0", 9.9, 10.1), ("delta0", 0.0, 40.0)
     drawn = stabilisable_chart(POINT, *narrow, "case2", first_lines=3, samples=5, tolerance=0.05)
@@ -180,6 +183,7 @@ def run(capsys, *arguments):
     return stop.value.code, out, err
 
 
+@pytest.mark.long
 def test_command_line(capsys, tmp_path):
     figure = tmp_path / "reach.png"
     status, out, err = run(

@@ -54,6 +54,7 @@ def said(drawn, position, at):
     return line.position, gap, int(line.counts[np.searchsorted(line.at, at)])
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("case", [paper(), turned(), turned(0.02)])
 def test_counts_are_those_of_the_exact_characteristic_function(case):
     """Another function and another contour; the drive's delay is in it."""
@@ -116,6 +117,7 @@ def test_weight_and_rate_show_the_same_boundary():
     assert compared > 20
 
 
+@pytest.mark.long
 def test_depth_and_speed(monkeypatch):
     """Along the speed there is no closed form: counts, and Newton's method at the edge."""
     # A string a line, each with its own finite elements.

@@ -39,6 +39,7 @@ def test_slices_have_the_areas_of_charts(volume):
     assert one.stable_area == pytest.approx(21.977, abs=0.01)
 
 
+@pytest.mark.long
 def test_volume_is_that_of_random_points(volume):
     """Counting roots at random points knows nothing of boundaries."""
     rng = np.random.default_rng(3)
@@ -54,6 +55,7 @@ def test_volume_is_that_of_random_points(volume):
     assert abs(volume.volume - share * box) < 3.5 * deviation
 
 
+@pytest.mark.long
 def test_finer_grids_stay_within_the_error(volume):
     finer = stability_volume(POINT, slices=53, lines=257)
     assert abs(finer.volume - volume.volume) < 2.0 * volume.volume_error
@@ -115,6 +117,7 @@ def test_the_command_writes_a_mesh(capsys, tmp_path):
     assert out.exists()
 
 
+@pytest.mark.long
 def test_gain_surface_has_the_values_of_single_loops():
     surface = gain_surface(POINT, m=3, order=0, count=5)
     assert surface.radius.shape == (5, 5)

@@ -66,6 +66,7 @@ def test_pi_against_a_lag_is_designed_for():
     assert found.K1[0, 1] <= -4.0 + 1e-6
 
 
+@pytest.mark.long
 def test_a_controller_of_first_order_stabilises_a_double_integrator():
     """y'' = u: the roots of the loop sum to E ≥ −3, so that α ≥ −1."""
     plant = DelaySystem([[0, 1], [0, 0]], B=[[0], [1]], C=[[1, 0]])

@@ -56,6 +56,7 @@ def test_bounds_bind(point_c, best_c):
     assert result.spectral_abscissa > best_c.spectral_abscissa
 
 
+@pytest.mark.long
 def test_rig_points_are_reported_in_rig_units():
     rig_point = RigPoint(table1(), 150 * np.pi / 30, 20 / 3600)
     result = design(rig_point, "case2")

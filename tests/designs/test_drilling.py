@@ -138,6 +138,7 @@ def rate_of(run, frequency):
     return np.polyfit(window * np.arange(1, count), logs, 1)[0]
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "damper"), [(120, 20, 0.05), (120, 10, -0.02), (100, 30, -0.02)]
 )
@@ -160,6 +161,7 @@ def test_growth_with_control_is_that_of_the_simulator(rpm, rop, damper):
     assert made.growth * measured > 0.0
 
 
+@pytest.mark.long
 def test_a_design_on_the_motion_holds_from_other_starts(quiet):
     assert quiet.recommended is True
     assert quiet.on_motion.growth < -0.1
@@ -189,6 +191,7 @@ def test_what_is_told(quiet):
     assert len(fields["on_motion"]["swings"]) == 2
 
 
+@pytest.mark.long
 def test_an_unstable_point_is_designed_for_its_motion(monkeypatch):
     monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (0.125,))
     monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
@@ -205,6 +208,7 @@ def test_an_unstable_point_is_designed_for_its_motion(monkeypatch):
     assert smooth.on_motion is None
 
 
+@pytest.mark.long
 def test_structures_are_compared_on_the_motion(monkeypatch):
     monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (0.125,))
     monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
@@ -217,6 +221,7 @@ def test_structures_are_compared_on_the_motion(monkeypatch):
     assert "good" in found.summary()
 
 
+@pytest.mark.long
 def test_nothing_is_recommended_where_nothing_helps(capsys, monkeypatch):
     monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
     monkeypatch.setattr("drillctrl.designs.motion_design.SHARES", (0.125,))
@@ -232,6 +237,7 @@ def test_nothing_is_recommended_where_nothing_helps(capsys, monkeypatch):
         assert change["swing"] <= 0.3
 
 
+@pytest.mark.long
 def test_gains_that_are_none_are_called_so(monkeypatch):
     """Stiffness alone cannot damp; runs from irregular motion differ by chance, not by its gain."""
     monkeypatch.setattr("drillctrl.designs.drilling._AMPLITUDES", ())
@@ -242,6 +248,7 @@ def test_gains_that_are_none_are_called_so(monkeypatch):
     assert found.verdict.reason == NONE_HELP
 
 
+@pytest.mark.long
 def test_a_quieter_motion_is_the_nearest_that_runs_show():
     found = {change.kind: change for change in quieter(as_case(at(60, 20)))}
     faster = found["speed"]

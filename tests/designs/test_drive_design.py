@@ -38,6 +38,7 @@ def test_it_is_what_compare_says_of_the_law(capsys):
     assert fields["stable"]
 
 
+@pytest.mark.long
 def test_at_a_point_the_rock_is_in_it(capsys):
     """At 120 rpm cutting excites the axial modes, whatever turns the string."""
     point = ("--speed", "120 rpm", "--rop", "10 m/h")
@@ -53,6 +54,7 @@ def test_at_a_point_the_rock_is_in_it(capsys):
     assert found.to_dict()["drilling"]["structure"] == "soft-torque"
 
 
+@pytest.mark.long
 def test_the_design_holds_for_strings_as_much_shorter_and_longer(capsys):
     """Prepared for others, it stands more on the worst of them, and hardly less on its own."""
     string = string_preset(RIG).string.torsion

@@ -147,6 +147,7 @@ def test_what_would_make_it_quiet_is_run(laws, monkeypatch):
     assert motion(0.2).quieter is None
 
 
+@pytest.mark.long
 def test_the_answer_says_what_it_was_designed_on_and_whether_it_was_tried(monkeypatch, capsys):
     monkeypatch.setattr(drive_design, "bit_load", lambda *arguments, **options: load())
     point = ["--rig", "vertical-3000", "--speed", "80 rpm", "--rop", "15 m/h", "--trials", "none"]

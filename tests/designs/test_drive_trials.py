@@ -103,6 +103,7 @@ def test_the_best_is_tried_out_of_a_stick_and_what_turns_back_no_further(drives,
     assert max(map(len, text.splitlines())) <= 80
 
 
+@pytest.mark.long
 def test_the_answer_of_a_dynamic_design_is_the_best_that_was_tried(monkeypatch):
     """Runs are made up here: the tuned Z-torque swings least, the dynamic law turns back."""
     swings = {"dynamic-0": 0.5, "z-torque-tuned": 0.1, "z-torque": 0.2}

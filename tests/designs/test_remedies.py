@@ -113,6 +113,7 @@ def test_narrow_bounds_are_named_as_the_reason():
     assert remedies(result)[0].name == "case1"
 
 
+@pytest.mark.long
 def test_rig_points_get_rpm():
     point = RigPoint(table1(), 120 * math.pi / 30, 20 / 3600)
     told = report(design(point, "p", trials=False))
@@ -137,6 +138,7 @@ def test_structures_that_do_not_combine_are_refused():
     assert feed(preset_structure("pd")).gain_names == ("K1_1_1", "K1_1_2", "K1_2_3", "K1_2_4")
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("rpm", [60, 90])
 def test_more_speed_is_tried_with_the_structure_asked_for(rpm):
     # A free top drive turns away without control: no speed is stable then.

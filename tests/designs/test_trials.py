@@ -58,6 +58,7 @@ def test_swing_without_control(rpm, rop, free):
     assert small.swing == pytest.approx(free, abs=0.005 if free == 0.10 else 0.0006)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "swing", "digits"),
     [
@@ -73,6 +74,7 @@ def test_swing_with_plain_damping(rpm, rop, swing, digits):
     assert tried.trials[0].controlled.swing == pytest.approx(swing, abs=digits)
 
 
+@pytest.mark.long
 def test_plain_damping_is_judged_by_what_it_does():
     helps = analyze(at(120, 50), "pd", [0.0, -0.5], [0.0, 0.0], trials=True)
     assert helps.spectral_abscissa > 0.0
@@ -110,6 +112,7 @@ def test_gains_of_least_abscissa_refused(rpm, rop, structure, ends):
     assert result.recommended is False
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("structure", ["case1", "case2"])
 @pytest.mark.parametrize("point", [at(150, 20), POINT_C], ids=["150 rpm", "C"])
 def test_stabilising_gains_recommended(point, structure):
@@ -126,6 +129,7 @@ def test_stabilising_gains_recommended(point, structure):
     assert ("switch them on once the bit turns" in result.verdict.reason) == worse
 
 
+@pytest.mark.long
 def test_point_f_of_the_paper():
     point = OperatingPoint(omega0=10.0, delta0=12.0, psi=14.0)
     # case1 settles after a push forward, but after a kick back it bounces, and falls behind the
@@ -208,6 +212,7 @@ def test_exit_codes(run):
     assert run("design", "--trials", "some")[0] == 2
 
 
+@pytest.mark.long
 def test_stable_but_refused_fails_require_stable(run):
     # Near the gains of least α at F: stable, and lost after a kick back.
     point = ("--omega0", "10", "--delta0", "12", "--psi", "14", "--structure", "case1")

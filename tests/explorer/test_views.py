@@ -218,6 +218,7 @@ def test_what_follows_the_hand_is_the_same_motion_in_short():
     assert short["data"] is None
 
 
+@pytest.mark.long
 def test_a_map_is_that_of_vibration_map():
     found, told = ask("map", FREE, x=[80, 160], y=[10, 30], counts=[2, 2])
     own = vibration_map(POINT, ("speed", 80, 160), ("rop", 10, 30), counts=(2, 2), refine=0)
@@ -259,6 +260,7 @@ def test_a_sketch_of_the_roots_is_that_of_the_analysis():
         assert "data" not in sketch
 
 
+@pytest.mark.long
 def test_a_law_is_designed_once_for_all_points_of_a_rig():
     """Its design takes seconds, and each drag of the point asks for it."""
     state = {**DRIVEN, "structure": "observer-2", "K1": None}

@@ -76,6 +76,7 @@ def apart(run, other, duration, names):
     return max(abs(getattr(first, name) - getattr(second, name)).max() for name in names)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("language", ["Python", "C"])
 def test_an_exported_controller_on_the_line_is_the_simulators(small, tmp_path, language):
     """A kick that takes the whole limit, and is caught."""
@@ -374,6 +375,7 @@ def test_the_command_answers_itself_records_and_replays(small, tmp_path, capsys)
         assert f"drillctrl: {option} = " in err
 
 
+@pytest.mark.long
 def test_control_c_ends_it_with_a_report():
     """Also while nothing but the clock runs."""
     command = ["bench", "--port", "0", "--json", "--duration", "1e4", "--outputs", "theta"]

@@ -97,6 +97,7 @@ def test_an_unstable_model_is_never_returned():
         model(5j)
 
 
+@pytest.mark.long
 def test_three_routes_to_a_growth_rate(band):
     """The mode with H, the loop with its rational model, and the Floquet multipliers."""
     where = at(120, 20)

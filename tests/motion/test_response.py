@@ -80,6 +80,7 @@ def test_where_smooth_drilling_is_stable_it_is_the_linear_transfer_function(freq
     assert found.error < 1e-3 * abs(expected)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "amplitude"),
     [(120, 20, 0.03), (80, 10, 0.1), (120, 20, 0.45), (120, 50, 0.03), (120, 50, 0.3)],
@@ -91,6 +92,7 @@ def test_a_program_of_fixed_steps_finds_the_same(rpm, rop, amplitude):
     assert abs(found.value - expected) * UNIT < 1.0 + found.error * UNIT
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "damping", "kick"),
     [
@@ -127,6 +129,7 @@ def test_a_led_speed_comes_out_as_asked_and_hardly_changes_the_answer_of_a_held_
     assert found.sign == -1
 
 
+@pytest.mark.long
 def test_two_motions_at_120_rpm_and_50_metres_an_hour():
     """Small swings decay, those of a kick end in a large one; the simulator has both."""
     where = rig_point(120, 50)
@@ -139,6 +142,7 @@ def test_two_motions_at_120_rpm_and_50_metres_an_hour():
     assert swing_of(quiet, 340.0, 400.0)[1].max() < 0.01
 
 
+@pytest.mark.long
 def test_a_swing_that_grows_from_rest_ends_where_the_damping_left_is_zero():
     where = rig_point(130, 50)
     start = {"dtheta": 0.02 * where.operating_point().omega0}
@@ -149,6 +153,7 @@ def test_a_swing_that_grows_from_rest_ends_where_the_damping_left_is_zero():
     assert crossing.amplitude == pytest.approx(kept, rel=0.1)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(("rpm", "rop"), [(120, 20), (100, 10), (120, 50)])
 def test_the_floor_is_the_swing_that_the_simulator_keeps(rpm, rop):
     where = rig_point(rpm, rop)
@@ -214,6 +219,7 @@ def test_modes_of_a_string_are_those_of_its_pipes():
     assert ratios == pytest.approx([mode.damping_ratio for mode in pipes], rel=0.02)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("drive", [None, DriveMachine(2900.0)], ids=["imposed", "driven"])
 def test_the_mode_of_a_real_string_that_drills_smoothly_is_the_root_of_its_linear_system(drive):
     """Where the axial motion settles, H is the transfer function of the cut."""
@@ -274,6 +280,7 @@ def test_what_has_no_orbit_is_refused(plant_c):
         drilling_motion(OperatingPoint(5.0, 0.2, 14.0), (0.3, 0.1))
 
 
+@pytest.mark.long
 def test_command_line(capsys, tmp_path):
     def run(*arguments):
         with pytest.raises(SystemExit) as stop:
@@ -322,6 +329,7 @@ def test_command_line(capsys, tmp_path):
         assert name in said.err
 
 
+@pytest.mark.long
 def test_answers_of_a_slow_swing_are_those_of_the_averaged_law():
     """What the mean torque on the axial orbit loses by speed is H at low frequency alone."""
     slower, faster = (axial_orbit(rig_point(100 * f, 10)) for f in (0.97, 1.03))
@@ -338,6 +346,7 @@ def test_answers_of_a_slow_swing_are_those_of_the_averaged_law():
     assert quick.value.real * UNIT > -13.0
 
 
+@pytest.mark.long
 def test_a_bit_that_swings_of_itself_has_no_answer():
     bouncing = bit_response(rig_point(60, 20), 1.0, 0.03, ripple=True, most_periods=40)
     assert bouncing.rippled > 0.5
@@ -352,6 +361,7 @@ def test_a_bit_that_swings_of_itself_has_no_answer():
     assert quiet.rippled < 0.03
 
 
+@pytest.mark.long
 def test_speeds_between_which_swings_decay(monkeypatch):
     monkeypatch.setattr("drillctrl.motion.threshold._POINTS", 4)
     monkeypatch.setattr("drillctrl.motion.threshold._HALVED", 2)

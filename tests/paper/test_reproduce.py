@@ -20,6 +20,7 @@ def verdict(rows, where, what):
     return next(row for row in rows if row.where == where and what in row.what).verdict
 
 
+@pytest.mark.long
 def test_every_part_is_drawn_and_tabled(made):
     folder, rows = made
     names = {path.name for path in folder.iterdir()}

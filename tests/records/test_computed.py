@@ -74,6 +74,7 @@ def test_a_slow_record_says_what_cannot_be_seen(tmp_path):
     assert study.period.value == pytest.approx(4.755, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_record_of_another_kind_is_fitted(tmp_path):
     """Travelling waves, gaps, and a law of the bit of another form than the fit's."""
     rig, off = WaveRig(length=3200.0, damping=0.2), (1.08, 0.95)

@@ -51,6 +51,7 @@ def sticking():
     return recorded(RIG, lag=0.05, seed=3, **STICKS)
 
 
+@pytest.mark.long
 def test_stick_slip_that_is_measured_at_the_bit(sticking):
     time, top, torque, bit = sticking
     noisy = bit + np.random.default_rng(0).normal(0.0, 1.0, bit.size)
@@ -138,6 +139,7 @@ def test_a_string_is_fitted_that_was_taken_wrong(sticking, tmp_path):
     np.testing.assert_allclose(seen.reflection[clear], reflected[clear], atol=0.05)
 
 
+@pytest.mark.long
 def test_a_lumped_rig_is_fitted(tmp_path):
     """One spring and one disc under the same drive, its torque measured in the pipe."""
     stiffness, inertia, damping, count = 938.0, 116.0, 0.25, 12000

@@ -82,6 +82,7 @@ def test_real_errors_below_the_real_radius_never_destabilise(loop):
         assert spectral_abscissa(replace(loop, A0=a0, delayed=(a1,))) < 0
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(("a", "b", "tau"), [(-0.4, -1.5, 0.5), (-1.0, 0.7, 2.0), (0.3, -0.8, 0.9)])
 def test_real_radius_of_a_scalar_equation_is_the_distance_to_its_boundary(a, b, tau):
     """x' = a x + b x(t − τ): the boundary in the plane of a and b is known in closed form."""

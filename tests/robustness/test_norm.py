@@ -120,6 +120,7 @@ def test_the_best_gain_of_an_integrator_with_dead_time():
     assert "H∞ norm from w to y1" in found.summary()
 
 
+@pytest.mark.long
 def test_a_limit_of_the_norm_is_met(point_c):
     between = HInfinity(outputs=("theta",))
     free = design(point_c, "case1", trials=False)

@@ -42,6 +42,7 @@ def test_a_bit_that_is_driven_on_grows_as_its_own_equation_says():
     assert last / before == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "structure", "K1", "K2", "rtol"),
     [
@@ -63,6 +64,7 @@ def test_what_is_named_goes_on_growing(monkeypatch, rpm, rop, structure, K1, K2,
     assert largest > 200.0 * before
 
 
+@pytest.mark.long
 def test_table_1_is_never_said_to_diverge_where_energy_only_goes():
     """Without control, or with damping by it, the drive alone gives energy."""
     random, seen = np.random.default_rng(7), set()
@@ -108,6 +110,7 @@ def test_neither_is_a_bit_that_bounces_ever_higher_as_it_falls_behind():
     assert 1.2 < sizes[2] / sizes[1] < 2.0
 
 
+@pytest.mark.long
 def test_a_bit_off_the_rock_for_turns_on_end_finds_the_face_again():
     """However many passes ago it was left; `rock_face` looks at all of them."""
     controller = Controller("case2", [-3.4, -3.05], [1.37, -1.14], limit=4.1)

@@ -64,6 +64,7 @@ def test_what_is_left_out_goes_with_the_square_of_the_size(stick_slip):
     assert coarse / fine == pytest.approx(16.0, rel=0.05)
 
 
+@pytest.mark.long
 def test_they_depend_neither_on_the_section_nor_on_the_start(stick_slip):
     found = floquet(stick_slip)
     period = found.period

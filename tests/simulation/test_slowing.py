@@ -66,6 +66,7 @@ def test_a_law_of_two_terms_is_the_pi_controller():
     assert one == pytest.approx(other, abs=1e-5)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", ["z-torque", "dynamic-1"])
 def test_a_law_with_states_of_its_own_moves_as_where_the_plant_closes_it(name):
     bare = rig(DriveMachine(2900.0))
@@ -91,6 +92,7 @@ def slowed():
     }
 
 
+@pytest.mark.long
 def test_the_designed_law_keeps_the_bit_turning_at_lower_speeds(slowed):
     """With the same delay of 20 ms and limit of 60 kN m."""
     soft, z, best = (slowed[name] for name in ("soft-torque", "z-torque", "dynamic-2"))
@@ -103,6 +105,7 @@ def test_the_designed_law_keeps_the_bit_turning_at_lower_speeds(slowed):
     assert best.linear < z.linear < soft.linear
 
 
+@pytest.mark.long
 def test_a_string_of_today_with_the_usual_damping():
     """3000 m: soft torque sticks at 45 rpm, Z-torque at 25, the designed law at neither."""
     today = string_preset("vertical-3000").with_rock_strength(1e6)

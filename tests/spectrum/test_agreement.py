@@ -22,6 +22,7 @@ agreement = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(agreement)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("first", [0, 40, 80])
 def test_random_systems_are_right_or_refused(first):
     systems = [agreement.random_system(first + k) for k in range(40)]

@@ -35,6 +35,7 @@ OSCILLATOR = DelaySystem([[0, 1], [-1, -0.1]], ([[0, 0], [0.05, 0]],), (400.0,))
 DRILL = plant_system(OperatingPoint(0.02, 1.75, 14))
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("system", "alpha", "digits"),
     [

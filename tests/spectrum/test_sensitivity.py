@@ -28,6 +28,7 @@ def nearest(roots, value):
     return min((r.value for r in roots), key=lambda s: abs(s - value))
 
 
+@pytest.mark.long
 @given(points, st.sampled_from(["p", "case1", "pd", "case2"]), st.integers(0, 10**6))
 def test_derivatives_match_differences(point, name, seed):
     point = point.with_changes(delta0=max(point.delta0, 0.05))

@@ -88,6 +88,7 @@ def test_roots_with_a_free_bit_are_those_of_finite_elements(name, machine):
         assert here < 0.02 * np.linalg.svd(delta, compute_uv=False)[-1]
 
 
+@pytest.mark.long
 def test_table_and_fields(run, tmp_path):
     names = ("stiff", "soft-torque", "dynamic-2")
     plot, out = tmp_path / "drives.png", tmp_path / "drives.csv"

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from drillctrl import (
     Damping,
@@ -60,6 +61,7 @@ def random_case(rng, law):
     return as_case(point, driven_plant(rig, rule_control(law, machine, string)))
 
 
+@pytest.mark.long
 def test_reduced_and_exact_strings_have_as_many_growing_roots():
     rng = np.random.default_rng(11)
     for law in 3 * LAWS:

@@ -134,6 +134,7 @@ def test_without_damping_a_law_is_not_refused_for_what_no_string_has():
     assert found.recommended
 
 
+@pytest.mark.long
 def test_refusals_on_the_command_line(tmp_path, capsys):
     def call(*arguments):
         with pytest.raises(SystemExit) as stop:

@@ -191,6 +191,7 @@ def test_what_a_drive_may_not_be():
         dynamic_drive_control(LINE, MACHINE, 5)
 
 
+@pytest.mark.long
 def test_second_order_stands_twice_what_soft_torque_does(second_order):
     """Over lengths of ±20 %, with a drive of 20 ms and a torque limit; each with its own soft."""
     soft = rule_control("soft-torque", LATE, LONG)

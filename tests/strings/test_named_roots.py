@@ -45,6 +45,7 @@ def turned(name, machine):
     return rig, control, case
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("machine", [DriveMachine(2900.0), LATE])
 @pytest.mark.parametrize("name", ["stiff", "soft-torque", "z-torque", "dynamic-1"])
 def test_a_law_in_the_plant_has_the_roots_of_the_exact_string(name, machine):
@@ -158,6 +159,7 @@ def test_what_does_not_fit_a_drive_is_refused(capsys, arguments, message):
     assert message in error.splitlines()[-1]
 
 
+@pytest.mark.long
 def test_a_free_bit_and_one_whose_torque_falls():
     """Free: the roots of string and drive alone; falling: over its critical slope a mode grows."""
     rig, control, _ = turned("soft-torque", LATE)

@@ -56,6 +56,7 @@ def test_the_edge_of_the_basin_is_an_edge():
         assert run.summary.settled == settles
 
 
+@pytest.mark.long
 def test_a_run_that_was_cut_short_goes_on(found, tmp_path):
     path = tmp_path / "campaign.checkpoint"
     with Checkpoint(path) as first:

@@ -42,6 +42,7 @@ def row(comparison, label):
     return next(one for one in comparison.rows if one.label == label).to_dict()
 
 
+@pytest.mark.long
 def test_designs_at_f(at_f):
     assert row(at_f, "p")["spectral_abscissa"] == pytest.approx(0.0441, abs=1e-4)
     assert row(at_f, "case1")["spectral_abscissa"] == pytest.approx(-0.3698, abs=1e-4)
@@ -153,6 +154,7 @@ class _Page(html.parser.HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.mark.long
 def test_the_page_is_whole_and_needs_nothing_else(at_f):
     page = _Page()
     text = at_f.to_html()

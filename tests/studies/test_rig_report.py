@@ -75,6 +75,7 @@ def test_field_units_are_used_throughout():
     assert not re.search(r"\d (kN|m/h|mm|MPa|t|kg·m²)\b", page)
 
 
+@pytest.mark.long
 def test_the_map_stands_on_it():
     found = rig_report(RigPoint(table1(), 170 * pi / 30, 20 / 3600), "p")
     assert found.map is not None
@@ -83,6 +84,7 @@ def test_the_map_stands_on_it():
     assert found.summary().startswith("Drill as planned")
 
 
+@pytest.mark.long
 def test_a_drive_is_set_by_its_rule(monkeypatch):
     rig = load_rig("vertical-3000")
     # The runs of a long string take half a minute and are tested with the simulator.

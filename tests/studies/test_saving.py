@@ -281,6 +281,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", RESULTS)
 def test_other_results_come_back_to_the_last_digit(tmp_path, name):
     found = RESULTS[name]()

@@ -78,6 +78,7 @@ def test_smooth_drilling_begins_at_the_linear_boundary(found):
     assert edge[:, 0].max() < 150.0
 
 
+@pytest.mark.long
 def test_dense_where_the_outcome_changes_and_nowhere_else():
     coarse = {**QUICK, "starts": ("small",), "duration": 120.0}
     fine = vibration_map(POINT, ("speed", 110.0, 180.0), Y, **{**coarse, "refine": 2})

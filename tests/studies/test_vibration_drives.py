@@ -89,6 +89,7 @@ def test_the_difference_is_between_the_two_laws(found):
     assert "under z-torque, under soft-torque" in found.summary().replace("\n", " ")
 
 
+@pytest.mark.long
 def test_a_rig_with_a_top_drive_is_held_by_a_stiff_one():
     alone = vibration_map(POINT, SPEED, ROP, **QUICK)
     stiff = vibration_map(POINT, SPEED, ROP, drive_control("stiff", RIG), **QUICK)
@@ -96,6 +97,7 @@ def test_a_rig_with_a_top_drive_is_held_by_a_stiff_one():
     assert alone.to_dict()["against"] == "stiff"
 
 
+@pytest.mark.long
 def test_laws_of_a_table_are_those_of_each_depth(tmp_path):
     made = drive_table(RIG, "soft-torque", [300.0, 420.0])
     (tmp_path / "laws.csv").write_text(made.to_csv())
@@ -138,6 +140,7 @@ def test_bad_input_is_refused(capsys, arguments, named):
     assert error.count("\n") == 1
 
 
+@pytest.mark.long
 def test_torsion_loses_its_damping_where_the_threshold_along_speed_has_it():
     """On a rig with little damping of its own, which the bit takes away at low speed."""
     rig = replace(table1(), torsional_damping=14.0)

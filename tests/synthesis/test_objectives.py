@@ -66,6 +66,7 @@ def test_quick_measures_agree_with_guaranteed_ones(point_c):
     assert measures.inverse_input_gain(family)(gains)[0] == pytest.approx(1.0 / peak, rel=1e-6)
 
 
+@pytest.mark.long
 def test_semidiscrete_design_beats_the_exact_one_on_its_own_measure_only(point_c, best_c):
     paper = design(point_c, "case1", objective=SemiDiscrete(20, 1), trials=False)
     rate = semidiscretize(paper.system(), 20, 1).growth_rate
@@ -74,6 +75,7 @@ def test_semidiscrete_design_beats_the_exact_one_on_its_own_measure_only(point_c
     assert paper.spectral_abscissa > best_c.spectral_abscissa
 
 
+@pytest.mark.long
 def test_semidiscrete_optimum_is_no_worse_than_differential_evolution(plant_c):
     structure = preset_structure("case1")
 
@@ -104,6 +106,7 @@ def test_worst_case_design_is_better_where_it_counts(point_c, best_c):
     assert worst(robust) < worst(best_c) - 0.02
 
 
+@pytest.mark.long
 def test_robust_design_lowers_the_pseudospectral_abscissa(point_c, best_c):
     result = design(point_c, "case1", objective=Robust(1e-3), trials=False)
     plant = result.plant
@@ -114,6 +117,7 @@ def test_robust_design_lowers_the_pseudospectral_abscissa(point_c, best_c):
     assert after < before - 0.05
 
 
+@pytest.mark.long
 def test_requirements_compose_with_the_objective(point_c, best_c):
     radius = 1.02 * relative_radius(best_c).value
     required = Requirements(stability_radius=radius)
@@ -224,6 +228,7 @@ def test_exact_is_the_default(point_c):
     assert design(point_c, "p", trials=False).objective == Exact()
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(("name", "alpha"), [("p", -0.169953919), ("pd", -0.783302734)])
 def test_wider_bounds_give_no_worse_gains(point_c, name, alpha):
     found = [
@@ -234,6 +239,7 @@ def test_wider_bounds_give_no_worse_gains(point_c, name, alpha):
     assert found[1] == pytest.approx(alpha, abs=1e-8)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(("m", "order"), [(40, 0), (40, 2)])
 def test_the_semi_discretised_optimum_is_reached(point_c, m, order):
     found = design(point_c, "case1", objective=SemiDiscrete(m, order), trials=False)

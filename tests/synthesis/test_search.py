@@ -40,6 +40,7 @@ def test_no_worse_than_differential_evolution(name, groups, damping):
     assert found <= oracle.fun + 1e-5
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("groups", [(18.37, 5.94, 21.17), (8.16, 5.77, 25.38), (15.24, 3.27, 19.8)])
 def test_more_search_finds_nothing_lower_in_case2(groups):
     """Narrow basins of quadruple roots, which sampling alone misses."""

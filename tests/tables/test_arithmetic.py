@@ -85,6 +85,7 @@ def test_no_step_costs_more_than_the_header_says(small, on_rig, tmp_path, option
         assert stated[2] <= 1.3 * most[2]
 
 
+@pytest.mark.long
 def test_float_differs_from_double_by_no_more_than_the_header_says(small, on_rig, tmp_path):
     rng = np.random.default_rng(6)
     for table, limit in ((small, 3.0), (on_rig, 2000.0)):

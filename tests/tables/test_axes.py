@@ -41,6 +41,7 @@ def four():
     return table(dimensionless_grid(*AXES, further=[KAPPA]), "case1", trials=False)
 
 
+@pytest.mark.long
 def test_nodes_are_those_of_their_damping_and_cells_are_looked_into(four):
     assert four.grid.shape == (2, 2, 2, 3)
     assert four.columns[:4] == ("omega0", "delta0", "psi", "kappa")

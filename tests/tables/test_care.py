@@ -28,6 +28,7 @@ def wave(k):
     return 0.05 * math.sin(0.1 * k) + 0.05
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("options", "compiler"), [*((options, "gcc") for options in SETS), (BUSY, "clang")]
 )
@@ -60,6 +61,7 @@ def test_hostile_inputs_stay_within_the_limit_and_the_status_says_so(
     assert seen == 255 - (0 if "rate_limit" in options else BIT["SLOWED"])
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("language", [Interpreted, InScl, Translated])
 @pytest.mark.parametrize("options", SETS)
 def test_the_function_block_is_the_c_under_hostile_inputs(

@@ -107,6 +107,7 @@ def test_what_cannot_be_done_is_refused_before_the_design(
     assert {path.name for path in tmp_path.iterdir()} == {"taken.csv", "mine.h"}
 
 
+@pytest.mark.long
 def test_a_saved_table_is_drawn_and_exported(capsys, tmp_path):
     saved, again = tmp_path / "gains.json", tmp_path / "again.json"
     _, said, _ = run(capsys, "table", *NODES, "--refine", 1, "--out", saved)

@@ -46,6 +46,7 @@ def test_a_node_with_other_gains_that_stands_out_a_little_is_begun_at_its_neighb
     assert asked.count(12) == 2
 
 
+@pytest.mark.long
 def test_a_descent_leaves_the_bounds_that_its_neighbours_gains_lie_on():
     # A neighbour's best p1 lies on its bound, the best one here does not.
     point = OperatingPoint(6.0, 61 / 7, 14.0)

@@ -182,6 +182,7 @@ def hostile(law, count, seed=0):
         yield *sample[:3], sample[3:], on, given
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", [*NAMES, "own", "resistance", "scheduled"])
 def test_every_language_gives_the_same_torque(laws, tmp_path, name):
     law, kinds = laws[name], (InC, InST, InScl)
@@ -262,6 +263,7 @@ def test_what_was_found_of_a_law_stands_in_all_that_is_written(laws, tmp_path):
     assert "no string was asked" in silent
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_ten_thousand_hostile_samples_stay_within_the_limit(laws, tmp_path, tool, compiler):
     """And two good minutes later it holds the speed again."""
@@ -285,6 +287,7 @@ def test_ten_thousand_hostile_samples_stay_within_the_limit(laws, tmp_path, tool
         assert (speed, u) == (pytest.approx(12.0, abs=0.5), pytest.approx(5e3, rel=0.1))
 
 
+@pytest.mark.long
 def test_the_source_is_clean_under_sanitizers_and_cppcheck(laws, tmp_path, tool):
     tool("cppcheck")
     for law in laws.values():
@@ -306,6 +309,7 @@ def test_the_source_is_clean_under_sanitizers_and_cppcheck(laws, tmp_path, tool)
         subprocess.run(check, cwd=tmp_path, check=True)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", ["soft-torque", "z-torque", "observer-1"])
 def test_the_sampled_law_becomes_the_continuous_one_as_the_period_shrinks(name):
     """The held torque is half a period late: first order, with the string in the loop."""
@@ -510,12 +514,14 @@ def test_float_differs_by_no_more_than_is_stated(laws, tmp_path, name):
     assert worst > 0.0
 
 
+@pytest.mark.long
 def test_float_is_refused_where_it_cannot_hold_the_law(laws, tmp_path):
     with pytest.raises(InputError, match="float could change the torque"):
         export_drive(laws["z-torque"], tmp_path / "drive.c", real="float")
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_blark_takes_the_block_and_no_name_is_taken(laws, tmp_path):
     blark = pytest.importorskip("blark")
     blark.parse_source_code(export_drive(laws["own"], tmp_path / "plain.st").read_text())
@@ -562,6 +568,7 @@ def test_laws_that_differentiate_or_grow_are_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_the_command_writes_laws_over_depth_and_at_one(tmp_path, capsys):
     def call(*arguments):
         base = ("table", "--rig", "vertical-3000", "--structure", "soft-torque")

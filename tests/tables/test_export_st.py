@@ -16,6 +16,7 @@ POINT = OperatingPoint(10.0, 2.5, 14.0)
 PERIOD, LIMIT = POINT.delay / 16, 3.0
 
 
+@pytest.mark.long
 def test_the_block_parses_and_gives_the_simulators_command(small, tmp_path):
     path = export_st(small, tmp_path / "drill.st", period=PERIOD, limit=LIMIT, ramp=0)
     text = path.read_text()

@@ -31,6 +31,7 @@ def assert_same(one, two):
     assert (one.give_up, one.fallback, one.seed) == (two.give_up, two.fallback, two.seed)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("which", ["small", "on_rig"])
 def test_round_trip_is_exact_and_bytes_repeat(ending, which, request, tmp_path):

@@ -37,6 +37,7 @@ def made():
         return table(grid, "pd", objective=QUICK, surroundings={"limit": 1.0})
 
 
+@pytest.mark.long
 def test_nodes_are_vouched_for_by_runs(made):
     assert made.on_motion
     assert not made.stable.any()

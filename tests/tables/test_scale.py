@@ -25,6 +25,7 @@ def same(one, other):
     ).all()
 
 
+@pytest.mark.long
 def test_known_designs_are_taken_and_change_nothing(small, tmp_path):
     path = tmp_path / "half.checkpoint"
     first = Checkpoint(path)
@@ -84,6 +85,7 @@ def test_a_file_that_is_no_checkpoint_is_refused_and_left_alone(content, tmp_pat
     assert path.read_bytes() == content
 
 
+@pytest.mark.long
 def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(tmp_path):
     whole, broken = tmp_path / "whole.csv", tmp_path / "broken.csv"
     program = [sys.executable, "-m", "drillctrl", *QUICK]
@@ -102,6 +104,7 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"whole.csv", "broken.csv"}
 
 
+@pytest.mark.long
 def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
@@ -130,6 +133,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(small, tmp_path):
     assert same(found, small)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.skipif(sys.platform == "win32", reason="no limits on the size of files")
 @pytest.mark.parametrize(("room", "refused"), [(200, "checkpoint = "), (2000, "--out = ")])
 def test_a_disk_without_room_is_one_line_and_leaves_the_old_file(room, refused, tmp_path):
@@ -228,6 +232,7 @@ def gone(pid):
     return not Path(f"/proc/{pid}").exists()
 
 
+@pytest.mark.long
 @on_linux
 def test_a_worker_that_is_killed_is_one_line(two_workers, tmp_path):
     run, pids = two_workers
@@ -240,6 +245,7 @@ def test_a_worker_that_is_killed_is_one_line(two_workers, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["gains.csv.checkpoint"]
 
 
+@pytest.mark.long
 @on_linux
 def test_workers_end_with_the_command_and_an_interrupt_is_one_line(two_workers):
     run, pids = two_workers

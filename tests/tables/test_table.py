@@ -92,6 +92,7 @@ def test_rig_coordinates_and_groups_are_inverse():
         assert grid.groups(list(places[0])).tolist() == grid.groups(places[:1]).tolist()
 
 
+@pytest.mark.long
 def test_a_worker_more_changes_nothing(small):
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
@@ -204,6 +205,7 @@ def test_the_largest_jump_may_be_at_the_border_of_a_cell(speeds):
     assert alone.jump[0] == 0.0
 
 
+@pytest.mark.long
 def test_refining_vouches_for_more_and_keeps_the_nodes():
     coarse = dimensionless_grid(linear_axis("omega0", 1, 9, 3), linear_axis("delta0", 1, 6, 2))
     tables = [
@@ -248,6 +250,7 @@ def test_people_read_the_units_of_the_field(on_rig):
     assert on_rig.to_dict()["axes"]["rotary_speed"][-1] == pytest.approx(220 * math.pi / 30)
 
 
+@pytest.mark.long
 def test_another_objective_is_designed_for_at_each_node():
     grid = dimensionless_grid(linear_axis("omega0", 9, 11, 2), 2.0, 14.0)
     worst = WorstCase(psi=0.2)
