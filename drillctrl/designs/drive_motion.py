@@ -88,6 +88,11 @@ class DriveMotion:
             for name, told in ((law, law), (STIFF, "a stiff drive"))
         ]
         lines.append(f"Damping left to the weakest of the first modes: {', '.join(ends)}.")
+        vague = sum(not each.known for each in self.bit.answers)
+        if vague:
+            count = len(self.bit.answers)
+            taken = "the others stand for it" if vague < count else "taken as none"
+            lines.append(f"What the bit answers is not known at {vague} of {count}: {taken}.")
         if self.quieter is not None:
             if none > _MOST * mine:
                 lines.append("No law of the drive leaves much less: none reaches that bounce.")

@@ -57,7 +57,7 @@ def settings_for(
     """Return the `Settings` of a run; ``drive`` is as `Scenario.drive` returns it."""
     arrays = structure.arrays
     n, m = arrays.B.shape
-    sides = 0 if linear else max(0, arrays.side_torque.size - 1)
+    sides = _count_sides(arrays, linear)
     p = len(structure.output_names)
     whole, real = np.zeros(data.ROWS, dtype=np.int64), np.zeros(data.LIMITS + 2 * m)
     whole[[data.STATES, data.INPUTS, data.OUTPUTS]] = n, m, p
@@ -124,7 +124,7 @@ def _rows(structure: Structure, controller: Controller | None, linear: bool) -> 
     string = structure.arrays
     n, m = string.B.shape
     p = len(structure.output_names)
-    sides = 0 if linear else max(0, string.side_torque.size - 1)
+    sides = _count_sides(string, linear)
     rows = np.zeros((n + p + 1, data.vector_length(n, m, sides)))
     inputs, top, load = n + 2 * m, n + 3 * m, n + 3 * m + 4
     rows[:n, :n], rows[:n, inputs:top], rows[:n, top:load] = string.A, string.B, string.T
@@ -158,6 +158,11 @@ def _rough(structure: Structure) -> npt.NDArray[np.bool_]:
     string = structure.arrays
     jumps = np.hstack([string.E, string.B, string.T])
     return np.asarray((string.C @ jumps != 0.0).any(axis=1))
+
+
+def _count_sides(string: MotionArrays, linear: bool) -> int:
+    """Return how many parts rub on the wall without the bit's; in small motion all slide."""
+    return 0 if linear else max(0, string.side_torque.size - 1)
 
 
 def _side(string: MotionArrays) -> FloatArray:

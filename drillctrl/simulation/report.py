@@ -143,7 +143,10 @@ def _chatter_lines(run: Simulation) -> list[tuple[str, str]]:
     switched = _switched(run)
     if switched is not None:
         return [
-            ("", f"at its limit in every sample, at the other one in {switched:.0%} of the next:"),
+            (
+                "",
+                f"at its limit nearly always, at the other one in {switched:.0%} of next samples:",
+            ),
             ("", "gains this high act like a relay; lower gains or a shorter period end that"),
         ]
     last = np.diff(run.times)[-_LAST_STEPS:]

@@ -78,7 +78,6 @@ def tuned_on_load(
     InputError
         If string and drive are unstable under all of these.
     """
-
     laws = _stable_laws(line, law_at)
     left = [min(bit.damping_left(mode) for mode in mode_slopes(line, law, _MODES)) for law in laws]
     if max(left) <= 0.0:

@@ -182,3 +182,17 @@ def test_bad_input_is_one_line(arguments, message, capsys):
     assert stop.value.code == 2
     assert not caught.out
     assert message in caught.err
+
+
+def test_what_is_not_known_of_the_bit_is_said(laws):
+    drives = compare_drives(RIG, laws[1:]).drives
+    vague = ANSWERS[0]._replace(known=False)
+
+    def told(answers):
+        return " ".join(drive_motion(WHERE, load(answers), drives).text(SI).split())
+
+    assert "not known" not in told(ANSWERS)
+    assert "not known at 1 of 2: the others stand for it" in told([vague, ANSWERS[1]])
+    assert "not known at 1 of 1: taken as none" in told([vague])
+    # With nothing known slopes are those of the string alone.
+    assert load([vague]).damping_left(drives[0].modes[0].slope) == drives[0].modes[0].slope.slope
