@@ -25,17 +25,18 @@ settings.load_profile("drillctrl")
 def pytest_collection_modifyitems(items):
     """Order and choose what runs.
 
-    The simulator, which compiles, comes first, beside what has no need of it. Of cases that are
-    marked ``long(but=1)`` the first is not.
+    The simulator, which compiles, comes first, beside what has no need of it; files of few tests
+    come last. Of cases that are marked ``long(but=1)`` the first is not.
     """
     rooms = ("spectrum", "charts", "delay", "base", "robustness", "synthesis")
     seen = Counter()
+    many = Counter(item.path for item in items)
 
     def turn(item):
         room, name = item.path.parts[-2:]
         if (room, name) == ("simulation", "test_string.py"):
-            return 0
-        return 1 if room in rooms else 2
+            return 0, 0
+        return 1 if room in rooms else 2, -many[item.path]
 
     for item in items:
         mark = item.get_closest_marker("long")

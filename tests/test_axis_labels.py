@@ -187,6 +187,7 @@ def test_of_charts(monkeypatch):
     check(root_locus(POINT, count=5).plot())
 
 
+@pytest.mark.long
 def test_of_tables_campaigns_and_maps():
     grid = dimensionless_grid(linear_axis("omega0", 8, 12, 2), linear_axis("delta0", 1, 3, 2), 14.0)
     check(table(grid, "p", trials=False).plot())

@@ -334,6 +334,7 @@ def test_simulate_a_controller_as_it_runs_on_a_rig(capsys, tmp_path):
     assert "rpm" in text
 
 
+@pytest.mark.long
 def test_simulate_changes_and_a_table(capsys, tmp_path):
     gains = tmp_path / "gains.csv"
     run(capsys, "table", "--omega0", "8:14:2", "--delta0", "1:4:2", "--out", gains)

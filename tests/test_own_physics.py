@@ -134,6 +134,7 @@ def test_gains_are_tried_on_the_plant_that_they_are_for():
     assert fresh.trials == tried.trials
 
 
+@pytest.mark.long
 def test_a_parameter_of_the_law_is_an_axis_of_a_table(tmp_path):
     plant, structure = PLANTS["velocity-weakening law"]
     grid = dimensionless_grid(

@@ -67,6 +67,7 @@ def test_the_answer_comes_first(capsys, verb):
     assert text.startswith(begins)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("verb", "theory"),
     [("analyze", "argument principle"), ("design", "argument principle"), ("bit", "Re H")],

@@ -53,6 +53,7 @@ def test_summaries_fit_a_terminal(capsys, arguments):
         assert "kN·m/rad" in told
 
 
+@pytest.mark.long
 def test_gains_can_be_copied_to_the_last_digit(capsys):
     def out(*arguments):
         with pytest.raises(SystemExit):

@@ -72,6 +72,7 @@ def test_open_loop_area_of_the_paper():
     assert drawn.stable_area == pytest.approx(share * box((SPEEDS, ("delta0", 0.0, 2.5))), rel=2e-3)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("changes", [{"psi": 26.0}, {"xi": 0.05, "kappa": 0.05}, {"blades": 3}])
 def test_open_loop_area_at_other_points(changes):
     point = POINT.with_changes(**changes)
@@ -212,6 +213,7 @@ def test_points_of_the_paper_lie_where_it_says():
     assert np.interp(10.0, top[:, 0], top[:, 1]) == pytest.approx(1.33, abs=0.01)
 
 
+@pytest.mark.long
 def test_rig_axes_agree_with_the_dimensionless_chart():
     rig_point = RigPoint(table1(), 120.0 * np.pi / 30.0, 20.0 / 3600.0)
     drawn = chart(rig_point, ("speed", "30 rpm", "300 rpm"), ("rop", 0.0, 60.0))
@@ -261,6 +263,7 @@ def test_bad_input_is_named(x, y, structure, gains, parameter):
     assert error.value.parameter == parameter
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("axes", "level", "strip"),
     [

@@ -60,6 +60,7 @@ def test_best_gains_hold_a_root_on_the_line():
     )
 
 
+@pytest.mark.long
 def test_line_where_p_ceases_to_help_follows_from_the_tangency():
     drawn = stabilisable_chart(POINT, SPEEDS, ("delta0", 0.0, 15.0), "p", **QUICK)
     tops = [line.at[-1] for line in drawn.lines]
@@ -117,6 +118,7 @@ def test_four_gains_reach_further_each_stable_place_proved():
     assert "no proof" in drawn.summary()
 
 
+@pytest.mark.long
 def test_four_gains_reach_a_band_of_depths_at_low_speed():
     axes = ("omega0", 2.9, 3.1), ("delta0", 2.0, 18.0)
     drawn = stabilisable_chart(POINT, *axes, "case2", first_lines=3, samples=5, tolerance=0.1)

@@ -69,6 +69,7 @@ def test_counts_are_those_of_the_exact_characteristic_function(case):
         assert loop.count_right_of(0.0, 300.0) == count, (position, y)
 
 
+@pytest.mark.long
 def test_stable_places_are_stable_and_others_are_not():
     drawn = chart(paper(), SPEED, RATE)
     rng = np.random.default_rng(1)
@@ -97,6 +98,7 @@ def test_gains_as_axes():
         assert count_right_of(drawn.plane.system(position, y), 0.0).count == count
 
 
+@pytest.mark.long
 def test_weight_and_rate_show_the_same_boundary():
     case = paper()
     by_rate = chart(case, SPEED, RATE)
@@ -133,6 +135,7 @@ def test_depth_and_speed(monkeypatch):
         assert loop.count_right_of(0.0, 300.0) == int(line.counts[np.searchsorted(line.at, speed)])
 
 
+@pytest.mark.long
 def test_mud_bears_on_weight_alone():
     drawn = chart(paper(), ("depth", 1000, 1400), ("mud", 1000, 2000), tolerance=1e-2)
     assert all(not line.at.size for line in drawn.lines)
@@ -159,6 +162,7 @@ def run(capsys, *arguments):
     return stop.value.code, caught.out, caught.err
 
 
+@pytest.mark.long
 def test_command_line(capsys):
     axes = ("--x", "speed=60:180 rpm", "--y", "rop=5:40 m/h")
     code, out, _ = run(

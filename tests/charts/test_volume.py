@@ -29,6 +29,7 @@ def volume():
     return stability_volume(POINT, slices=27)
 
 
+@pytest.mark.long
 def test_slices_have_the_areas_of_charts(volume):
     for k in (5, 14, 26):
         exact = chart(

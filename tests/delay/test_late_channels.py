@@ -137,6 +137,7 @@ def test_many_outputs_through_one_late_input_are_one_signal():
         assert gradient == pytest.approx(slopes, abs=1e-5)
 
 
+@pytest.mark.long
 def test_feedback_may_be_earlier_than_a_state_arrives():
     """A double integrator with feedback 0.2 late, beside a state that hears itself after 1."""
     a0, late = np.diag([1.0, 0.0], 1), np.zeros((3, 3))
@@ -257,6 +258,7 @@ def test_a_late_input_before_six_other_delays(exchanger):
     assert loop[0, 0, 0] == pytest.approx(-(gains @ expected)[0, 0], rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_gain_behind_a_late_input_is_designed_for(exchanger):
     """One gain: the best of 401 over its range is no better."""
     plant, *_ = exchanger

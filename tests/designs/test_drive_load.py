@@ -50,6 +50,7 @@ def laws():
     return [drive_control("dynamic-0", RIG, bit=bit) for bit in (None, load())]
 
 
+@pytest.mark.long
 def test_the_forced_swing_is_that_of_one_wave_by_hand(laws):
     """Two ports by their transfer matrix, the drive at the top and the bit's own answer below."""
     s = np.array([2j * np.pi * SHAKEN])

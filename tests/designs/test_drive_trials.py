@@ -58,6 +58,7 @@ def test_what_swings_least_and_harms_from_no_start_is_best(drives):
     assert max(map(len, text.splitlines())) <= 80
 
 
+@pytest.mark.long
 def test_trials_are_runs_of_the_law_with_its_delay_and_limit(drives, monkeypatch):
     """The small start once more, by hand and to a closer tolerance."""
     monkeypatch.setattr("drillctrl.designs.drive_trials.STARTS", STARTS[:1])

@@ -68,6 +68,7 @@ def test_torque_cannot_stabilise_point_e_and_feed_beside_it_can():
         assert spectral_abscissa(loop) > result.spectral_abscissa
 
 
+@pytest.mark.long
 def test_the_summary_of_point_e_says_what_would_stabilise_it():
     told = report(design(POINT_E, "case1", trials=False))
     text = told.summary()
@@ -89,6 +90,7 @@ def test_the_summary_of_point_e_says_what_would_stabilise_it():
     assert fields["remedies"][2]["structure"] is None
 
 
+@pytest.mark.long
 def test_the_speed_is_the_lowest_stable_one_found():
     speed = remedies(design(POINT_E, "p", trials=False))[-1].result.point
     rate = POINT_E.penetration_rate
@@ -106,6 +108,7 @@ def test_a_richer_preset_is_named_at_point_f():
     assert "structure case1 within the paper's bounds" in told.summary()
 
 
+@pytest.mark.long
 def test_narrow_bounds_are_named_as_the_reason():
     narrow = {"K1": (-0.1, 0.1), "K2": (0.0, 0.1)}
     result = design(OperatingPoint(10.0, 12.0, 14.0), "case1", bounds=narrow, trials=False)

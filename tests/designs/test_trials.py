@@ -50,6 +50,7 @@ def refused():
     return design(at(120, 20), "case2", objective=Exact())
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("rpm", "rop", "free"), [(120, 20, 0.015), (100, 10, 0.011), (120, 50, 0.10)]
 )
@@ -86,6 +87,7 @@ def test_plain_damping_is_judged_by_what_it_does():
     assert "no measurable good" in idle.reason
 
 
+@pytest.mark.long
 def test_harmful_gains_are_refused_first(refused):
     assert refused.recommended is False
     assert [trial.controlled.outcome for trial in refused.trials] == ["turns-back"] * 3
@@ -201,6 +203,7 @@ def run(capsys):
     return called
 
 
+@pytest.mark.long
 def test_exit_codes(run):
     rig = ("--rig", "table1", "--rop", "20 m/h", "--speed", "120 rpm", "--structure", "case2")
     status, out = run("design", *rig, "--require-stable", "--objective", "exact")
@@ -307,6 +310,7 @@ def tried_table():
     return table(Grid((speed, rate, Axis("rock_strength", (60e6,))), table1()), "case2")
 
 
+@pytest.mark.long
 def test_table_refuses_by_node(tried_table, tmp_path):
     assert tried_table.refused.tolist() == [False, True]
     assert (tried_table.gains[1] == 0.0).all()

@@ -116,6 +116,7 @@ def test_the_growth_rate_is_that_of_the_whole_simulator(rpm, rop, damping, kick)
     assert found.root.real == pytest.approx(rate, rel=0.06)
 
 
+@pytest.mark.long
 def test_a_led_speed_comes_out_as_asked_and_hardly_changes_the_answer_of_a_held_bit():
     where = rig_point(120, 20)
     imposed, led = (bit_response(where, 1.0, 0.05, ripple=ripple) for ripple in (False, True))
@@ -164,6 +165,7 @@ def test_the_floor_is_the_swing_that_the_simulator_keeps(rpm, rop):
     assert drilling_motion(where, (0.03,)).floor == pytest.approx(swing, rel=0.15)
 
 
+@pytest.mark.long
 def test_the_orbit_at_steady_rotation():
     orbit = axial_orbit(rig_point(120, 20))
     # With torsion free the bit's speed ripples by 1.5 %, which moves the orbit a little.
@@ -180,6 +182,7 @@ def test_the_orbit_at_steady_rotation():
     assert irregular.lifted > 0.3
 
 
+@pytest.mark.long
 def test_irregular_orbits_have_an_error_and_unbounded_ones_no_number():
     irregular = bit_response(rig_point(80, 20), 1.0, 0.03, most_periods=40)
     assert 1.0 < irregular.error * UNIT < 60.0
@@ -380,6 +383,7 @@ def test_speeds_between_which_swings_decay(monkeypatch):
         assert (swings[-1] > swings[0]) == grows
 
 
+@pytest.mark.long
 def test_answers_are_kept_by_what_computed_them(tmp_path, monkeypatch):
     """Other arguments, other sources and a file that was cut short are none of them."""
     where = OperatingPoint(10.0, 1.75, 14.0)

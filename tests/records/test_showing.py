@@ -164,6 +164,7 @@ def test_a_lumped_rig_is_fitted(tmp_path):
     assert study.swing == pytest.approx(truth, abs=0.05)
 
 
+@pytest.mark.long
 def test_a_lumped_rig_stands_for_a_string(sticking, tmp_path):
     """What is known as a disc on a spring is recorded as pipe and collars, which carry waves."""
     time, top, torque, bit = sticking
@@ -184,6 +185,7 @@ def test_a_lumped_rig_stands_for_a_string(sticking, tmp_path):
     assert read.inertia == pytest.approx(study.fit.inertia.value)
 
 
+@pytest.mark.long
 def test_nothing_needs_to_be_known_of_the_string(sticking):
     time, top, torque, bit = sticking
     study = study_record(record_of(time, top, torque), own_inertia=RIG.drive)

@@ -182,6 +182,7 @@ def test_a_far_delay_margin_is_found():
     assert math.isinf(margin.limit)
 
 
+@pytest.mark.long
 @settings(max_examples=20)
 @given(st.integers(0, 10**6))
 def test_pencil_and_boxes_find_the_same_critical_delays(seed):

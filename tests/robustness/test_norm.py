@@ -57,6 +57,7 @@ def test_without_delay_the_hamiltonian_matrix_agrees():
         assert not on_axis(value * (1 + 1e-4))
 
 
+@pytest.mark.long
 def test_late_channels_and_scaled_states_change_nothing(plant_c):
     gains = [-5.03, -4.91], [-1.67, -0.31]
     loop = close_loop(plant_c, _case2(), *gains)

@@ -121,6 +121,7 @@ def test_a_run_goes_on_from_the_midst_of_turning_back(share):
         np.testing.assert_allclose(getattr(second.at(times), name), there, atol=1e-7)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("cutting", ["multiple", "single"])
 def test_no_run_breaks_off_because_the_bit_turns_back(cutting):
     rng = np.random.default_rng(7)

@@ -59,6 +59,7 @@ def test_the_stick_slip_orbit_attracts(stick_slip):
     assert (found.residuals < 1e-6).all()
 
 
+@pytest.mark.long
 def test_what_is_left_out_goes_with_the_square_of_the_size(stick_slip):
     coarse, fine = (floquet(stick_slip, size=size).trivial_error for size in (4e-4, 1e-4))
     assert coarse / fine == pytest.approx(16.0, rel=0.05)
@@ -106,6 +107,7 @@ def test_at_rest_under_samples_they_are_the_growth_of_a_run(period):
         assert again.largest == pytest.approx(abs(found[0]), abs=1e-6)
 
 
+@pytest.mark.long
 def test_an_orbit_under_fast_samples_is_nearly_that_of_the_continuous_law():
     apart, errors = [], []
     for period in (None, 0.1, 0.05):

@@ -29,6 +29,7 @@ def lasting(rpm, rop, **options):
     return simulate(point, duration=400.0, initial=kick, **options)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(("rpm", "name"), [(70.0, "stick-slip"), (90.0, "bounces")])
 def test_chaos_is_told(rpm, name):
     """There the tolerance decides where the bit is in the end, and not elsewhere."""

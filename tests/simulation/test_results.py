@@ -90,6 +90,7 @@ def test_files_of_a_rig_state_their_units(on_a_rig, tmp_path):
         simulate(POINT, duration=1.0).in_rig_units()
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("cutting", ["multiple", "single"])
 @pytest.mark.parametrize("start", ["t = 0", "past"])
 def test_the_rock_face_is_what_is_cut(cutting, start):

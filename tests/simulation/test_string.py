@@ -219,6 +219,7 @@ def test_another_string_or_law_does_not_recompile(stick_slip):
     assert len(march.signatures) == 1
 
 
+@pytest.mark.long
 def test_a_run_is_looked_at_in_another_process():
     # Machine code of the law stands at another place there.
     run = simulate(POINT, duration=2.0)

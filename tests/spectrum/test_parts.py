@@ -65,6 +65,7 @@ def test_states_that_no_delayed_signal_reaches():
 
 # Whole numbers make nilpotent delayed matrices and delays that act on nothing: det Δ is
 # (s − a)^k by hand.
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     ("seed", "multiplicity"),
     [

@@ -14,6 +14,7 @@ from ..strategies import loops
 pytest.importorskip("flint")
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(loops())
 def test_proof_and_count_agree(loop):

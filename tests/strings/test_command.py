@@ -96,6 +96,7 @@ def test_what_does_not_fit_a_run_under_a_drive_is_said_in_one_line(call, argumen
     assert error.count("\n") == 1
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize(
     "verb", [("simulate", "--duration", "0.1 s"), ("analyze",)], ids=lambda verb: verb[0]
 )

@@ -70,6 +70,7 @@ def test_reduced_and_exact_strings_have_as_many_growing_roots():
         assert exact_loop(case).count_right_of(0.0) == known
 
 
+@pytest.mark.long
 def test_roots_of_reduced_strings_are_those_of_exact_ones():
     """Those that grow or hardly decay, up to 10 Hz, of every law of the drive."""
     rng = np.random.default_rng(5)

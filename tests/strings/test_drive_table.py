@@ -46,6 +46,7 @@ def call(capsys):
     return run
 
 
+@pytest.mark.long
 def test_the_table_on_the_command_line(call, tmp_path):
     options = ("--rig", "vertical-3000", "--structure", "stiff", "--depth", "6000:8000:2 ft")
     out, plot = tmp_path / "laws.csv", tmp_path / "laws.png"

@@ -112,6 +112,7 @@ def run(capsys, *arguments):
     return stop.value.code, said.out, said.err
 
 
+@pytest.mark.long
 def test_analyze_tells_modes_and_reflection(capsys):
     code, said, _ = run(capsys, *RIG, "--structure", "soft-torque", "--json")
     assert code == 0

@@ -69,6 +69,7 @@ def test_mud_bears_on_no_root_and_a_lumped_rig_has_no_depth():
         restrung(case.plant, depth=50.0)
 
 
+@pytest.mark.long
 def test_the_worst_of_several_lengths_is_what_each_of_them_gives():
     case = coarse(RIG)
     found = design(case, "p", objective=WorstCase(psi=0.0, depth=0.1), trials=False)

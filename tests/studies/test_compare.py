@@ -167,6 +167,7 @@ def test_the_page_is_whole_and_needs_nothing_else(at_f):
     assert text == at_f.to_html()
 
 
+@pytest.mark.long
 def test_the_command(capsys, tmp_path):
     out = tmp_path / "rows.csv"
     with pytest.raises(SystemExit) as stop:
@@ -202,6 +203,7 @@ def test_bad_input_is_refused_in_one_line(capsys, options, named):
     assert captured.err.count("\n") == 1
 
 
+@pytest.mark.long
 def test_charts_give_areas_and_ratios(point_c):
     found = compare(point_c, ["p"], duration=20.0)
     fields = {one.label: one.to_dict() for one in found.rows}

@@ -31,6 +31,7 @@ def found():
     return rig_report(POINT, name="my rig", date="2026-11-29", mapped=False)
 
 
+@pytest.mark.long
 def test_it_names_what_a_rig_has_and_no_theory(found):
     page = found.to_html()
     told = words(page)
@@ -43,6 +44,7 @@ def test_it_names_what_a_rig_has_and_no_theory(found):
     assert "http" not in re.sub(r"base64,[^\"]*", "", page)
 
 
+@pytest.mark.long
 def test_the_same_input_makes_the_same_page(found):
     again = rig_report(POINT, name="my rig", date="2026-11-29", mapped=False)
     assert again.to_html() == found.to_html()
@@ -68,6 +70,7 @@ def test_settings_are_the_gains_with_the_sign_of_a_drive(found):
     assert f"{P / 1e3:.3g} kN·m·s/rad" in told
 
 
+@pytest.mark.long
 def test_field_units_are_used_throughout():
     page = words(rig_report(replace(POINT, units="field"), mapped=False).to_html())
     for wanted in ("65.62 ft/h", "8.702 ksi", "klbf", "kft·lbf·s/rad", "8.504 in"):
@@ -134,6 +137,7 @@ def test_a_date_is_printed_only_where_it_is_asked_for(monkeypatch):
     assert abs(apart.days) <= 1
 
 
+@pytest.mark.long
 def test_the_verb_writes_the_page_and_one_object(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     out = tmp_path / "r.html"

@@ -104,6 +104,7 @@ def test_a_run_that_was_cut_short_goes_on(found, tmp_path):
     assert seen == [("simulate", 1, 2), ("simulate", 2, 2)]
 
 
+@pytest.mark.long
 def test_gains_of_a_table_are_those_of_each_point():
     grid = dimensionless_grid(linear_axis("omega0", 8, 12, 2), linear_axis("delta0", 1, 3, 2), 14.0)
     gains = table(grid, "p", trials=False)
@@ -150,6 +151,7 @@ def test_files_and_pictures_hold_the_rows(found, tmp_path):
         found.save(tmp_path / "m.xls")
 
 
+@pytest.mark.long
 def test_the_verb_prints_what_the_function_finds(capsys, tmp_path):
     out = tmp_path / "m.csv"
     with pytest.raises(SystemExit) as stop:

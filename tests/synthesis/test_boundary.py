@@ -14,6 +14,7 @@ def points():
         yield OperatingPoint(*rng.uniform(low, high), xi=damping, kappa=damping)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", ["p", "case1", "pd"])
 def test_the_explicit_boundary_confirms_the_optimum(name):
     for point in points():

@@ -137,6 +137,7 @@ int main(void)
 """
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_sanitizers_find_nothing_under_hostile_inputs(on_rig, tmp_path, compiler, tool):
     tool(compiler)

@@ -14,6 +14,7 @@ def run(capsys, *arguments):
     return stop.value.code, captured.out, captured.err
 
 
+@pytest.mark.long
 def test_contract(capsys, tmp_path):
     out, plot = tmp_path / "gains.csv", tmp_path / "gains.svg"
     status, text, err = run(

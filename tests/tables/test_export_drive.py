@@ -214,6 +214,7 @@ extern "C" double count_step(const double *given, int on, double elapsed, double
 """
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("name", ["soft-torque", "dynamic-2", "own", "resistance", "scheduled"])
 def test_no_step_costs_more_than_the_header_says(laws, tmp_path, name, tool):
     """The same source, compiled as C++ with numbers that count what is done to them."""

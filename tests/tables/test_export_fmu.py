@@ -188,6 +188,7 @@ def test_a_clock_that_runs_back_a_tighter_limit_and_odd_steps(small, unit, tmp_p
         slave.set(u=1.0)
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_declarations_are_those_of_the_standard(unit, tmp_path, version, compiler, tool):
     """The source compiles alone and with the standard's headers, no warning either way."""

@@ -62,6 +62,7 @@ def test_gains_between_nodes_do_no_harm(made):
         assert mine.swing <= free.swing + 0.02
 
 
+@pytest.mark.long
 def test_gains_follow_the_point_across_a_cell(made):
     """From 110 to 120 rpm and back they do no harm; with their sign turned they do."""
 

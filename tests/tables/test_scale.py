@@ -161,6 +161,7 @@ def test_a_disk_without_room_is_one_line_and_leaves_the_old_file(room, refused, 
     assert {path.name for path in tmp_path.iterdir()} == {"gains.json"}
 
 
+@pytest.mark.long(but=1)
 @pytest.mark.parametrize("address", ["nowhere", "foo://127.0.0.1:1"])
 def test_a_scheduler_that_does_not_answer_is_refused(address, tmp_path):
     options = ["--omega0", "8:14:2", "--delta0", "1:6:2", "--scheduler", address]
@@ -262,6 +263,7 @@ def test_workers_end_when_the_command_is_killed(two_workers):
     assert all(gone(pid) for pid in pids)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_standard_output_without_room_is_one_line():
     program = [sys.executable, "-m", "drillctrl", "table", "--omega0", "9", "--delta0", "1"]

@@ -22,6 +22,7 @@ from drillctrl.tables.grid import Axis
 from drillctrl.tables.interpolation import Cells
 
 
+@pytest.mark.long
 def test_nodes_are_as_good_as_single_designs_and_agree_with_analyze(small):
     K1, K2 = small.gains_at(*np.array([[p.omega0, p.delta0, p.psi] for p in small.grid.points]).T)
     for i, point in enumerate(small.grid.points):
@@ -59,6 +60,7 @@ def test_interpolation_is_bilinear_and_clamped(small):
     assert not small.stable_at(99.0, 0.0, 14.0).any()
 
 
+@pytest.mark.long
 def test_smoothing_keeps_its_promise(small):
     smooth = table(small.grid, "case1", trials=False, give_up=0.1)
     assert smooth.jump[0] < small.jump[0]
