@@ -15,13 +15,10 @@ from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import crossings
-from drillctrl.spectrum.circle import critical_phases
 from drillctrl.spectrum.critical import critical_points
 from drillctrl.spectrum.roots import spectral_abscissa
 
 LONGEST_DELAYS = 10.0
-# States times delayed signals up to which one eigenvalue problem costs less than a sweep.
-_LARGEST = 80
 _AT_ONCE = 50
 
 
@@ -85,10 +82,9 @@ def delay_margin(system: DelaySystem) -> DelayMargin:
     Notes
     -----
     With one delay all frequencies at which some delay puts a root on the axis come from one
-    eigenvalue problem (`drillctrl.spectrum.critical`), or with many states and delayed signals from
-    a sweep of the phase (`drillctrl.spectrum.circle`). With several delays, boxes of frequency
-    and factor that a Lipschitz bound clears of roots are removed, up to ten times the delays.
-    No crossing is stepped over.
+    eigenvalue problem or a sweep of the phase (`drillctrl.spectrum.critical`). With several
+    delays, boxes of frequency and factor that a Lipschitz bound clears of roots are removed, up to
+    ten times the delays. No crossing is stepped over.
     """
     if not system.delays:
         raise InputError("delays", system.delays, "at least one")
@@ -108,10 +104,7 @@ def _nearest_factors(system: DelaySystem) -> Iterator[tuple[float, float]]:
     """Yield (f, ω): for every critical pair of ω and angle the nearest delays of either side."""
     system = system.balanced
     (left, right), tau = system.factors[0], system.delays[0]
-    if left.size > _LARGEST:
-        frequencies, phases = critical_phases(system.A0, system.delayed[0])
-    else:
-        _, frequencies, phases, _ = critical_points(system.A0[None], left[None], right[None])
+    _, frequencies, phases, _ = critical_points(system.A0[None], left[None], right[None])
     for omega, phase in zip(frequencies.tolist(), phases.tolist(), strict=True):
         turn = 2.0 * math.pi / (omega * tau)
         first = phase / (omega * tau)

@@ -5,7 +5,8 @@ followed over φ in [0, π] (they are conjugate at −φ) with their first and s
 that a point costs n³ operations where the linear problem of `drillctrl.spectrum.critical` has
 2n² unknowns. Steps are halved until those that may reach the axis move straight; there Newton's
 method is begun. The crossings must be those by which the number of eigenvalues right of the axis
-changes from point to point.
+changes from point to point. With few delayed signals they are read off the response over frequency
+(`resonances`), which must agree with the number of eigenvalues at a few phases.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.spectrum.critical import sharpened
+from drillctrl.spectrum.critical_newton import IntArray, sharpened
+from drillctrl.spectrum.resonances import critical_frequencies, modal_response
 
 BoolArray = npt.NDArray[np.bool_]
 
 _LOST = "crossings of the axis could not be told apart"
 _FIRST = 48
+# Delayed signals up to which the response over frequency is looked at; phases that check it.
+_FEW, _CHECKS = 4, 9
 _MOST_POINTS = 4000
 _ROUNDS = 20
 # Shortest step; what changes within it is a crossing at it.
@@ -47,13 +51,17 @@ class _Point:
         return int((self.values.real > 0.0).sum())
 
 
-def critical_phases(A0: FloatArray, A1: FloatArray) -> tuple[FloatArray, FloatArray]:
+def critical_phases(
+    A0: FloatArray, left: FloatArray, right: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return all (ω, φ) with a root at iω where ωτ = φ modulo 2π.
 
     Parameters
     ----------
-    A0, A1 : array, (n, n)
-        Act on X(t) and X(t − τ).
+    A0 : array, (n, n)
+        Acts on X(t).
+    left, right : array, (n, r) and (r, n)
+        Factors of A1, which acts on X(t − τ).
 
     Returns
     -------
@@ -65,16 +73,18 @@ def critical_phases(A0: FloatArray, A1: FloatArray) -> tuple[FloatArray, FloatAr
     ArithmeticError
         If a branch runs along the axis, so that crossings cannot be told apart.
     """
+    A1 = left @ right
+    if left.shape[1] <= _FEW:
+        seen = _by_frequency(A0, left, right)
+        if seen is not None:
+            return seen
     points, starts = _followed(A0, A1)
     for _ in range(_ROUNDS):
         begun = np.array(starts).reshape(-1, 2).T
-        # At −ω the phase is −φ.
         omega, phase = np.abs(begun[0]), np.where(begun[0] < 0.0, -begun[1], begun[1])
         rows = np.zeros(omega.shape, dtype=np.intp)
         _, omega, phase, direction = sharpened(A0[None], A1[None], rows, omega, phase)
-        upper = phase <= math.pi
-        folded = np.where(upper, phase, 2.0 * math.pi - phase)
-        turn = np.where(upper, direction, -direction)
+        folded, turn = _folded(phase, direction)
         lost = [
             (one, other)
             for one, other in itertools.pairwise(points)
@@ -89,6 +99,33 @@ def critical_phases(A0: FloatArray, A1: FloatArray) -> tuple[FloatArray, FloatAr
             starts += [start for point in (one, middle, other) for start in _starts(point, width)]
         points.sort(key=lambda point: point.phase)
     raise ArithmeticError(_LOST)
+
+
+def _folded(phase: FloatArray, direction: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return phases in [0, π] and which way a root moves as they grow; at −ω the phase is −φ."""
+    upper = phase <= math.pi
+    return np.where(upper, phase, 2.0 * math.pi - phase), np.where(upper, direction, -direction)
+
+
+def _by_frequency(
+    A0: FloatArray, left: FloatArray, right: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return what the response over frequency tells, where counts at some phases bear it out."""
+    response = modal_response(A0, left, right)
+    if response is None:
+        return None
+    omega, phase = critical_frequencies(*response)
+    A1 = left @ right
+    rows = np.zeros(omega.shape, dtype=np.intp)
+    _, omega, phase, direction = sharpened(A0[None], A1[None], rows, omega, phase)
+    folded, turn = _folded(phase, direction)
+    checks = np.linspace(0.0, math.pi, _CHECKS)
+    values = np.linalg.eigvals(A0 + np.exp(-1j * checks)[:, None, None] * A1)
+    counts = (values.real > 0.0).sum(axis=1)
+    for one, other, change in zip(checks, checks[1:], np.diff(counts), strict=False):
+        if turn[(folded > one) & (folded <= other)].sum() != change:
+            return None
+    return omega, phase
 
 
 def _followed(A0: FloatArray, A1: FloatArray) -> tuple[list[_Point], list[tuple[float, float]]]:

@@ -1,26 +1,34 @@
 """Frequencies at which a loop with one delay has a root on the axis, for any delay.
 
-A root at iω with z = exp(−iωτ) makes A0 + zA1 singular against iω and its conjugate against
-−iω, so that (A0 + zA1) X + X (A0 + A1/z)ᵀ = 0 has a solution X (Chen, Gu and Nett 1995). With
-A1 = L R only RX and XRᵀ matter, and with z counted from a place z0 on the unit circle they are
-eigenvectors of a matrix of 2nr rows whose eigenvalues are −1/(z − z0). All critical z come
-out at once; nothing is sampled.
+With one delayed signal, A1 = l rᵀ, a root lies at iω for some delay where |rᵀ(iω − A0)⁻¹ l| = 1:
+at the eigenvalues iω of a Hamiltonian matrix of 2n rows (Boyd, Balakrishnan and Kabamba 1989).
+
+With more of them: a root at iω with z = exp(−iωτ) makes A0 + zA1 singular against iω and its
+conjugate against −iω, so that (A0 + zA1) X + X (A0 + A1/z)ᵀ = 0 has a solution X (Chen, Gu and
+Nett 1995). With A1 = L R only RX and XRᵀ matter, and with z counted from a place z0 on the unit
+circle they are eigenvectors of a matrix of 2nr rows whose eigenvalues are −1/(z − z0). All
+critical z come out at once; nothing is sampled. Where 2nr is large the phase is swept (`circle`).
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.delay.reduced import inverses
-
-IntArray = npt.NDArray[np.intp]
+from drillctrl.spectrum.circle import critical_phases
+from drillctrl.spectrum.critical_newton import IntArray, sharpened
 
 # Places on the circle that no loop has a reason to be critical at; several in case one is.
 _PLACES = np.exp(1j * np.array([2.347, 0.911, -1.653]))
 _NEAR_CIRCLE = 1e-3
 _NEAR_AXIS = 1e-3
+# States times delayed signals up to which one eigenvalue problem costs less than a sweep.
+_LARGEST = 80
+# Numbers of all matrices that are taken at once.
+_AT_ONCE = 2_000_000
 
 
 def critical_points(
@@ -43,17 +51,72 @@ def critical_points(
         ω > 0 and φ in [0, 2π).
     direction : int array, (k,)
         +1 where the root moves to the right as the delay grows, −1 to the left.
+
+    Raises
+    ------
+    ArithmeticError
+        If crossings of the axis cannot be told apart.
     """
-    count, _, rank = left.shape
+    count, n, rank = left.shape
     if rank == 0 or count == 0:
         none = np.zeros(0)
         return none.astype(np.intp), none, none, none.astype(np.intp)
+    if rank == 1:
+        starts = _of_one_signal
+    else:
+        starts = _of_few_signals if n * rank <= _LARGEST else _swept
+    late = left @ right
+    slices = min(count, math.ceil(count * (2 * n * rank) ** 2 / _AT_ONCE))
+    parts = []
+    for some in np.array_split(np.arange(count), slices):
+        rows, omega, phase = starts(A0[some], left[some], right[some])
+        parts.append(sharpened(A0, late, some[rows], omega, phase))
+    rows, omega, phase, direction = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return rows, omega, phase, direction
+
+
+def _of_one_signal(
+    A0: FloatArray, left: FloatArray, right: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return (loop, ω, φ) where to begin; the signal is scaled as its column is."""
+    column, row = np.linalg.norm(left, axis=(1, 2)), np.linalg.norm(right, axis=(1, 2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.sqrt(row / column)[:, None, None]
+    scale[~np.isfinite(scale) | (scale == 0.0)] = 1.0
+    n, turned = A0.shape[1], A0.transpose(0, 2, 1)
+    matrix = np.zeros((len(A0), 2 * n, 2 * n))
+    matrix[:, :n, :n], matrix[:, n:, n:] = A0, -turned
+    matrix[:, :n, n:] = (left * scale) @ (left * scale).transpose(0, 2, 1)
+    matrix[:, n:, :n] = -(right / scale).transpose(0, 2, 1) @ (right / scale)
+    values = np.linalg.eigvals(matrix)
+    near = (values.imag > 0) & (np.abs(values.real) < _NEAR_AXIS * np.abs(values))
+    rows, columns = np.nonzero(near)
+    omega = np.asarray(values[rows, columns].imag, dtype=float)
+    inverse = inverses(1j * omega[:, None, None] * np.eye(n) - A0[rows])
+    response = (right[rows] @ inverse @ left[rows])[:, 0, 0]
+    fine = np.isfinite(response)
+    return rows[fine], omega[fine], np.angle(response[fine])
+
+
+def _swept(
+    A0: FloatArray, left: FloatArray, right: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return (loop, ω, φ) of loops with many states and signals."""
+    found = [critical_phases(*loop) for loop in zip(A0, left, right, strict=True)]
+    rows = np.repeat(np.arange(len(found)), [omega.size for omega, _ in found])
+    omega, phase = (np.concatenate(each) for each in zip(*found, strict=True))
+    return rows, omega, phase
+
+
+def _of_few_signals(
+    A0: FloatArray, left: FloatArray, right: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return (loop, ω, φ) where to begin, from all critical z at once."""
     z = _candidates(A0, left, right)
     rows, columns = np.nonzero(np.abs(np.abs(z) - 1.0) < _NEAR_CIRCLE)
     found = z[rows, columns]
     found = found / np.abs(found)
-    late = left @ right
-    roots = np.linalg.eigvals(A0[rows] + found[:, None, None] * late[rows])
+    roots = np.linalg.eigvals(A0[rows] + found[:, None, None] * (left @ right)[rows])
     size = np.abs(A0).max(axis=(1, 2), initial=0.0)[rows, None]
     away = np.abs(roots.real) / (np.abs(roots) + 1e-3 * size)
     away = np.where(roots.imag > 0, away, np.inf)
@@ -62,8 +125,7 @@ def critical_points(
     near = (away < _NEAR_AXIS) & (away < 10.0 * least + 1e-6)
     which, columns = np.nonzero(near)
     omega = np.asarray(roots[which, columns].imag, dtype=float)
-    phase = -np.angle(found[which])
-    return sharpened(A0, late, rows[which], omega, phase)
+    return rows[which], omega, -np.angle(found[which])
 
 
 def _candidates(A0: FloatArray, left: FloatArray, right: FloatArray) -> ComplexArray:
@@ -118,53 +180,3 @@ def _eigenvalues(
     values = np.linalg.eigvals(matrix.reshape(count, 2 * size, 2 * size))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(values == 0.0, np.inf, place - 1.0 / values))
-
-
-def sharpened(
-    A0: FloatArray, late: FloatArray, rows: IntArray, omega: FloatArray, phase: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
-    """Newton's method on det Δ(iω, φ) = 0; keep what converges nearby, once each."""
-    start, omega, phase = omega, omega.copy(), phase.copy()
-    eye = np.eye(A0.shape[1])
-    good = np.ones(rows.shape, dtype=bool)
-    step, turn = np.zeros(rows.shape), np.zeros(rows.shape)
-    by_omega, by_phase = np.ones((2, *rows.shape), dtype=complex)
-    # Those that still move.
-    on = np.arange(rows.size)
-    for _ in range(12):
-        term = np.exp(-1j * phase[on])[:, None, None] * late[rows[on]]
-        inverse = inverses(1j * omega[on, None, None] * eye - A0[rows[on]] - term)
-        # Derivatives of ln det Δ: a step solves by_omega δω + by_phase δφ = −1.
-        new_omega = 1j * np.trace(inverse, axis1=1, axis2=2)
-        new_phase = 1j * np.einsum("qij,qji->q", inverse, term)
-        fine = np.isfinite(new_omega) & np.isfinite(new_phase)
-        by_omega[on[fine]], by_phase[on[fine]] = new_omega[fine], new_phase[fine]
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            across = (by_omega[on] * by_phase[on].conj()).imag
-            along, around = by_phase[on].imag / across, -by_omega[on].imag / across
-        # Where Δ is singular to the last bit nothing is left to do.
-        good[on] = np.isfinite(along) & np.isfinite(around) | ~fine
-        step[on] = np.where(good[on] & fine, along, 0.0)
-        turn[on] = np.where(good[on] & fine, around, 0.0)
-        scale = 0.05 * (1e-3 + np.abs(omega[on]))
-        omega[on] += np.clip(step[on], -scale, scale)
-        phase[on] += np.clip(turn[on], -0.2, 0.2)
-        on = on[(np.abs(step[on]) > 1e-11 * omega[on]) | (np.abs(turn[on]) > 1e-11)]
-        if not on.size:
-            break
-    keep = good & (np.abs(step) < 1e-8 * omega) & (np.abs(turn) < 1e-8) & (omega > 1e-9)
-    keep &= np.abs(omega - start) < 0.05 * (1e-3 + start)
-    rows, omega, phase = rows[keep], omega[keep], phase[keep] % (2.0 * np.pi)
-    direction = -np.sign((by_omega[keep] / by_phase[keep]).imag).astype(np.intp)
-    order = np.lexsort((phase, omega, rows))
-    rows, omega, phase, direction = rows[order], omega[order], phase[order], direction[order]
-    if not rows.size:
-        return rows, omega, phase, direction
-    apart = np.abs(np.diff(phase))
-    same = (
-        (np.diff(rows) == 0)
-        & (np.diff(omega) < 1e-8 * omega[1:])
-        & (np.minimum(apart, 2 * np.pi - apart) < 1e-7)
-    )
-    once = np.concatenate([[True], ~same])
-    return rows[once], omega[once], phase[once], direction[once]

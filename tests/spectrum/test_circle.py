@@ -6,7 +6,8 @@ import pytest
 from drillctrl import DelaySystem, count_right_of, delay_margin
 from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.spectrum.circle import critical_phases
-from drillctrl.spectrum.critical import critical_points
+from drillctrl.spectrum.critical import _of_few_signals, critical_points
+from drillctrl.spectrum.critical_newton import sharpened
 
 
 def matrices(seed):
@@ -26,7 +27,7 @@ def test_sweep_and_eigenvalue_problem_agree(first):
         now, late = matrices(seed)
         (left, right), *_ = DelaySystem(now, (late,), (1.0,)).factors
         _, omega, phase, _ = critical_points(now[None], left[None], right[None])
-        swept = critical_phases(now, late)
+        swept = critical_phases(now, left, right)
         assert np.sort_complex(swept[0] + 1j * swept[1]) == pytest.approx(
             np.sort_complex(omega + 1j * phase), abs=1e-9
         )
@@ -34,10 +35,39 @@ def test_sweep_and_eigenvalue_problem_agree(first):
     assert seen > 20
 
 
+def lightly_damped(seed):
+    """Oscillators with damping from 1e-7 on that one to four delayed signals couple."""
+    rng = np.random.default_rng(seed)
+    many, rank = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+    now = np.zeros((2 * many, 2 * many))
+    now[:many, many:] = np.eye(many)
+    now[many:, :many] = -np.diag(rng.uniform(0.5, 5.0, many) ** 2)
+    now[many:, many:] = -np.diag(10.0 ** rng.uniform(-7.0, -1.0, many))
+    left = rng.normal(size=(2 * many, rank)) * 10.0 ** rng.uniform(-3.0, 0.7)
+    return now, left, rng.normal(size=(rank, 2 * many))
+
+
+def test_response_over_frequency_and_eigenvalue_problem_agree():
+    # Signals that are one or few are read off their response, here beside 2nr linear unknowns.
+    seen = 0
+    for seed in range(30):
+        now, left, right = lightly_damped(seed)
+        start = _of_few_signals(now[None], left[None], right[None])
+        _, omega, phase, _ = sharpened(now[None], (left @ right)[None], *start)
+        read = critical_phases(now, left, right)
+        assert np.sort_complex(read[0] + 1j * read[1]) == pytest.approx(
+            np.sort_complex(omega + 1j * phase), abs=1e-7
+        )
+        if left.shape[1] == 1:
+            assert critical_points(now[None], left[None], right[None])[1] == pytest.approx(omega)
+        seen += omega.size
+    assert seen > 60
+
+
 def test_a_branch_that_touches_the_axis_and_turns_back_is_not_stepped_over():
     # x' = −a x − b x(t − τ) with b a little above a: critical in a short range of phases only.
     now, late = np.diag([-1.0, -2.0, -3.0]), np.diag([-1.000001, -1.9, -2.9])
-    omega, phase = critical_phases(now, late)
+    omega, phase = critical_phases(now, late, np.eye(3))
     assert omega == pytest.approx([np.sqrt(1.000001**2 - 1.0)], rel=1e-9)
     assert np.cos(phase) == pytest.approx([-1.0 / 1.000001], abs=1e-12)
 
