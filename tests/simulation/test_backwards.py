@@ -142,6 +142,24 @@ def test_no_run_breaks_off_because_the_bit_turns_back(cutting):
     assert reversals > 25
 
 
+def test_a_bit_that_turns_back_as_it_sets_off_cuts_on_where_it_turned():
+    where = RigPoint(table1(), 16.374292285980058, 0.0014169194868292984)
+    controller = Controller("case2", [2.7076, 2.6534], [-2.1661, -0.5415], limit=1.0)
+    start = Scenario("rest")
+    # Not without end if it stands where the face behind it begins.
+    run = simulate(where, controller, scenario=start, duration=4.0, rtol=1e-9, time_limit=60.0)
+    assert run.status == "done"
+    ((back, resumed),) = (run.phases("behind")[0],)
+    assert back == 0.0
+    times = np.linspace(resumed + 1.0, 4.0, 101)[1:]
+    motion = run.at(times, ("theta", "delay", "dtheta"))
+    forward = (run.point.omega0 + motion.dtheta > 0.0) & (motion.delay < times - resumed)
+    assert forward.sum() > 20
+    earlier = run.at((times - motion.delay)[forward], ("theta",))
+    turned = run.point.omega0 * motion.delay[forward] + motion.theta[forward] - earlier.theta
+    np.testing.assert_allclose(turned, 0.5 * math.pi, atol=1e-6)
+
+
 def test_energy_of_a_bit_that_turns_back():
     run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, rtol=1e-10)
     motion = run.on_steps(9)

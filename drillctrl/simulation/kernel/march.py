@@ -66,6 +66,8 @@ TIME, STEP, NEXT_SAMPLE, TURNED_T, TURNED_THETA, REALS = range(6)
 REFINE = 6
 # A break that is nearer than this, relative to the angle turned, is met.
 PASSED = 5e-14
+# Tries without a step after which no step is to be had.
+MOST_TRIES = 1000
 
 
 @inner
@@ -245,6 +247,9 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             return MORE_ROOM
         if ints[I_TORSION] == REVERSE and settings.whole[BACKWARDS] == 0:
             return REVERSED
+        ints[STALLS] += 1
+        if ints[STALLS] > MOST_TRIES:
+            return COLLAPSE
         mode = mode_of(ints, reals, chain)
         level = ints[I_LEVEL]
         if not known:
@@ -342,9 +347,6 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         if kind >= 0:
             if where * h < SHORTEST * max(1.0, abs(t)):
                 # Negative from the start: no step, another mode.
-                ints[STALLS] += 1
-                if ints[STALLS] > 20:
-                    return COLLAPSE
                 snap(kind, y, bit)
                 enter(settings, history, steps, ints, reals, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
@@ -357,9 +359,9 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                     ints[REJECTED] += 1
                     continue
                 reached, at_goal = -1, False
-        ints[STALLS] = 0
 
         # Accept.
+        ints[STALLS] = 0
         t = goal if at_goal else t + h
         for i in range(size):
             y[i] = new[i]
