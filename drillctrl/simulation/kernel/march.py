@@ -61,7 +61,7 @@ from .switch import next_mode, next_saturation, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
- REJECTED, EVALUATIONS, I_SATURATED, I_BEHIND, LAG0) = range(16)  # fmt: skip
+ REJECTED, EVALUATIONS, UNSETTLED, I_SATURATED, I_BEHIND, LAG0) = range(17)  # fmt: skip
 TIME, STEP, NEXT_SAMPLE, TURNED_T, TURNED_THETA, REALS = range(6)
 REFINE = 6
 # A break that is nearer than this, relative to the angle turned, is met.
@@ -286,8 +286,12 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         h = max(h, 1e-15 * max(1.0, abs(t)))
         # A step that an event cuts short is no time in which to stop what moves.
         reach = max(h, reals[STEP])
-        if fresh and hold_sides(settings, mode, reach, y, k[0], work.vectors[BETWEEN]):
-            rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+        if fresh and settings.whole[SIDES] > 0:
+            held, settled = hold_sides(settings, mode, reach, y, k[0], work.vectors[BETWEEN])
+            if held:
+                rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+            if not settled:
+                ints[UNSETTLED] += 1
         fresh = False
 
         error = attempt(settings, history, steps, mode, t, h, y, work)
