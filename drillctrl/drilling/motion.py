@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -23,6 +24,7 @@ from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.linear import BIT_STATES, linear_depth, linearisation
 from drillctrl.drilling.plant import Evaluator, Plant, by_form, evaluator, expressions
 
+logger = logging.getLogger("drillctrl")
 BIT_COEFFICIENTS = ("rotary_speed", "penetration_rate", "blades")
 
 
@@ -99,7 +101,7 @@ class MotionArrays(NamedTuple):
         c1, c2 and d0 of the linear depth of cut.
     drag : array, (n, 2)
         As in `Realisation`, for all states.
-    side_force, side_rate, side_torque : array, (n, k), (k, n + 1), (k,)
+    side_force, side_rate, side_torque, side_held : array, (n, k), (k, n + 1), (k,), (k,)
         As in `Realisation`, for all states.
     """
 
@@ -120,6 +122,7 @@ class MotionArrays(NamedTuple):
     side_force: FloatArray
     side_rate: FloatArray
     side_torque: FloatArray
+    side_held: FloatArray
 
     @property
     def top_torque(self) -> float:
@@ -148,6 +151,7 @@ def _motion(plant: Plant) -> Evaluator:
         ca.vertcat(made.side_force, ca.SX(size - placed, parts)),
         ca.horzcat(made.side_rate[:, :-1], ca.SX(parts, size - placed), made.side_rate[:, -1]),
         made.side_torque,
+        made.side_held,
         ca.vertcat(made.drag, ca.SX(size - placed, 2)),
     ]
     return evaluator(form, [q, load, *matrices, depth, *linear, *sides, *late])
@@ -163,14 +167,14 @@ def motion_arrays(plant: Plant, parameters: FloatArray) -> MotionArrays:
     """
     values = [value[0] for value in _motion(plant)(parameters[None])]
     q, steady, a, e, b, t, c, r, depth, linear, left, right, *others = values
-    force, rate, friction, drag, inputs, *rest = others
+    force, rate, friction, held, drag, inputs, *rest = others
     if e[1, 1] != 0.0 or e[3, 0] != 0.0:
         raise InputError("string", "a mass that couples x and theta", "uncoupled at the bit")
     late = tuple((float(rest[i][0, 0]), rest[i + 1]) for i in range(0, len(rest), 2))
     delayed = left @ right[:, :BIT_STATES]
     return MotionArrays(
         q.ravel(), steady.ravel(), a, e, b, t, c, r, inputs.ravel(), late, linear, delayed,
-        depth.ravel(), drag, force, rate, friction.ravel(),
+        depth.ravel(), drag, force, rate, friction.ravel(), held.ravel(),
     )  # fmt: skip
 
 
@@ -196,7 +200,8 @@ def kicked_states(
     """Return by how much all of a string moves faster whose bit is kicked, (n,).
 
     A bit alone has next to no inertia of a long string: what it is given is gone at once. So the
-    string moves with it as if the bit were led slowly, and its top end goes on as it did.
+    string moves with it as if the bit were led slowly, and its top end goes on as it did. Where a
+    string has no such motion the bit alone is kicked, and a warning is logged.
 
     Parameters
     ----------
@@ -214,6 +219,7 @@ def kicked_states(
         try:
             led, _ = _led(arrays, *speeds, held=held)
         except InputError:
+            logger.warning("the string cannot follow its bit slowly: the bit alone is kicked")
             led = np.zeros_like(kick)
             led[own] = sum(speeds)
         felt = np.abs(led) > 1e-9 * np.abs(led[moving]).max()

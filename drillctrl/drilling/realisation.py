@@ -47,10 +47,10 @@ class Realisation:
         What a jump of an imposed speed of the top end, axial or torsional, adds to the states at
         once where inertia hangs on it: then its acceleration acts, which ``T`` leaves out. On
         the states of the string without its blocks'.
-    side_force, side_rate, side_torque : SX, (n0, k), (k, n0 + 1), (k, 1)
+    side_force, side_rate, side_torque, side_held : SX, (n0, k), (k, n0 + 1), (k, 1), (k, 1)
         Of friction along the string, on the n0 states that it has without its blocks': what a
-        torque of each part does, its speed by states and by that of an imposed top end, and the
-        most that its torque can be.
+        torque of each part does, its speed by states and by that of an imposed top end, its
+        torque while it slides, and the most that holds it at rest.
     """
 
     states: tuple[Signal, ...]
@@ -68,6 +68,7 @@ class Realisation:
     side_force: ca.SX = field(default_factory=lambda: ca.SX(0, 0))
     side_rate: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     side_torque: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    side_held: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     @property
     def delays_of_inputs(self) -> ca.SX:
@@ -156,6 +157,7 @@ def realise(string: String) -> Realisation:
         ca.SX(ca.Sparsity.diag(2 * count)) * 0 + ca.SX.eye(2 * count), reference,
         drag=drag, side_force=side_force, side_rate=side_rate,
         side_torque=ca.vertcat(ca.SX(0, 1), *(side.torque for side in string.sides)),
+        side_held=ca.vertcat(ca.SX(0, 1), *(side.held for side in string.sides)),
     )  # fmt: skip
     for name, (quantity, weights) in string.outputs.items():
         # What an imposed end has moved is in the reference of all that hangs from it.

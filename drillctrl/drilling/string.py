@@ -30,12 +30,13 @@ class SideFriction(NamedTuple):
     ----------
     weights : mapping
         Coordinate → its share in the angle of that part; 1 in all where all turn as one.
-    torque : expression
+    torque, held : expression
         Of friction while it slides, and the most that holds it at rest.
     """
 
     weights: Mapping[str, Expression]
     torque: Expression
+    held: Expression
 
 
 @makes_of_kinds

@@ -103,6 +103,7 @@ def finished(standing: March, outcome: int, **asked: Any) -> Simulation:
         status=status.get(outcome, Status.STEP_LIMIT),
         rejected=int(standing.ints[march.REJECTED]),
         evaluations=int(standing.ints[march.EVALUATIONS]),
+        unsettled=int(standing.ints[march.UNSETTLED]),
         settings=standing.settings,
         # A view: what was never written to takes no memory.
         history=data.History(*(array[:used] for array in standing.history)),

@@ -67,6 +67,7 @@ def settings_for(
     real[data.CUT] = structure.steady_depth
     real[[data.BY_WEIGHT, data.BY_TORQUE]] = arrays.E[1, 0], arrays.E[3, 1]
     real[data.WALL] = arrays.side_torque[:1].sum()
+    real[data.WALL_HELD] = arrays.side_held[:1].sum()
     real[[data.RTOL, data.ATOL]] = rtol, atol
     real[data.SCALE : data.LIMITS] = _scales(structure)
     real[data.BOUNDS : data.WALL] = real[data.LIMITS :] = np.inf
@@ -171,7 +172,8 @@ def _side(string: MotionArrays) -> FloatArray:
     free = rate[:, :-1] @ force
     # What holds the bit turns the string back by as much as friction turns the bit.
     held = free - np.outer(rate[:, :-1] @ string.E[:, 1], force[3]) / string.E[3, 1]
-    return np.hstack([rate, string.side_torque[1:, None], free, held])
+    torques = np.stack([string.side_torque, string.side_held], axis=1)[1:]
+    return np.hstack([rate, torques, free, held])
 
 
 def _noise(controller: Controller, names: tuple[str, ...], duration: float) -> FloatArray:

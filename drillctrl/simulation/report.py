@@ -284,6 +284,9 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
         limited = f", at a limit for {share:.1%} of the run" if share else ""
         lines.append(("Control", f"{torque}{limited}"))
     lines.append(("Effort", f"{s.steps} steps, {s.events} events, {s.elapsed_seconds:.3g} s"))
+    if run.unsettled:
+        told = f"friction on the wall was not found in {run.unsettled} steps"
+        lines.append(("", told))
     return set_out(lines)
 
 

@@ -46,6 +46,9 @@ class Simulation(Trace):
         Tolerances of a step.
     rejected, evaluations : int
         Steps that were repeated; evaluations of the right-hand side.
+    unsettled : int
+        Steps whose friction along the string was not found: its parts did not come to agree with
+        one another in 200 sweeps, and the last sweep was taken.
     rig : Rig or None
         Where the run was of a `RigPoint`.
     """
@@ -59,6 +62,7 @@ class Simulation(Trace):
     atol: float
     rejected: int
     evaluations: int
+    unsettled: int = 0
     rig: Rig | None = field(default=None, repr=False)
 
     @property

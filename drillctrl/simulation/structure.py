@@ -75,7 +75,7 @@ class Structure:
 
     def is_same(self, other: Structure) -> bool:
         """Whether another string and law move alike."""
-        names = ("q", "A", "E", "B", "T", "side_force", "side_rate", "side_torque")
+        names = ("q", "A", "E", "B", "T", "side_force", "side_rate", "side_torque", "side_held")
         # Coefficients that a string has no use for are NaN.
         return self.law == other.law and all(
             np.array_equal(getattr(self.arrays, name), getattr(other.arrays, name), equal_nan=True)

@@ -134,17 +134,20 @@ class DrillString:
         return STANDARD_GRAVITY * section.mass_per_metre * lift
 
     @functools.cached_property
-    def wall_torques(self) -> tuple[tuple[float, float], ...]:
-        """Length, m, and torque on the wall per metre, N, of each section from the top down."""
+    def wall_torques(self) -> tuple[tuple[float, float, float], ...]:
+        """Length, m, and torque on the wall per metre, N, of each section from the top down.
+
+        The first torque is that while it slides, the second the most that holds it at rest.
+        """
         return tuple(
-            (s.length, s.wall.torque(self.buoyed(s), 0.5 * s.widest) if s.wall else 0.0)
+            (s.length, *(s.wall.torques(self.buoyed(s), 0.5 * s.widest) if s.wall else (0.0, 0.0)))
             for s in self.sections
         )
 
     @property
     def wall_torque(self) -> float:
         """Torque of friction on the wall while the whole string slides, N m."""
-        return sum(length * torque for length, torque in self.wall_torques)
+        return sum(length * torque for length, torque, _ in self.wall_torques)
 
     @functools.cached_property
     def torsion(self) -> Line:

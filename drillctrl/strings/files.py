@@ -92,6 +92,7 @@ COLUMNS: dict[str, Dimension | None] = {
     "shear_modulus": units.STRESS,
     "density": units.DENSITY,
     "friction_factor": units.NUMBER,
+    "static_factor": units.NUMBER,
     "inclination": units.ANGLE,
     "side_force": units.SIDE_FORCE,
 }
@@ -302,7 +303,8 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
         ``joints`` (and ``joint length``), ``outer diameter`` or ``OD``, ``inner diameter`` or
         ``ID``, ``tool joint OD``, ``tool joint ID``, ``tool joint length``, ``weight`` (per
         metre), ``material``, ``youngs modulus``, ``shear modulus``, ``density``, and for friction
-        on the wall ``friction factor`` with ``inclination`` or ``side force``, in any order.
+        on the wall ``friction factor`` with ``inclination`` or ``side force``, and perhaps
+        ``static factor``, in any order.
         A unit stands behind a value, or behind the column's name: ``OD [in]``.
 
     Raises
@@ -411,7 +413,7 @@ def _written(row: Mapping[str, Any], name: str) -> dict[str, tuple[str, object]]
 
 
 def _wall(value: Mapping[str, Any], where: str) -> Wall | None:
-    names = ("friction_factor", "inclination", "side_force")
+    names = ("friction_factor", "static_factor", "inclination", "side_force")
     given = {name: value[name] for name in names if name in value}
     if not given:
         return None

@@ -161,8 +161,8 @@ class PipeString(StringModel):
             return ()
         names = _names("theta", torsion)
         return tuple(
-            SideFriction(_weights(names, shares), torque * unit)
-            for shares, torque in wall_parts(torsion, [*self.string.wall_torques][::-1])
+            SideFriction(_weights(names, shares), torque * unit, held * unit)
+            for shares, torque, held in wall_parts(torsion, [*self.string.wall_torques][::-1])
         )
 
 

@@ -19,11 +19,13 @@ class Wall:
     Attributes
     ----------
     friction_factor : float
-        Of Coulomb friction, the same at rest and sliding.
+        Of Coulomb friction while it slides.
     inclination : float
         Of the hole from the vertical, rad: the buoyed weight presses by its sine.
     side_force : float or None
         Force that presses, N/m, in place of that of the weight.
+    static_factor : float or None
+        Friction factor at rest, not below ``friction_factor``; by default the same.
 
     Raises
     ------
@@ -34,17 +36,20 @@ class Wall:
     friction_factor: float
     inclination: float = 0.0
     side_force: float | None = None
+    static_factor: float | None = None
 
     def __post_init__(self) -> None:
         checked_number("friction factor", self.friction_factor, 0.0, 2.0)
+        if self.static_factor is not None:
+            checked_number("static factor", self.static_factor, self.friction_factor, 4.0)
         checked_number("inclination", self.inclination, 0.0, math.pi)
         if self.side_force is not None:
             checked_number("side force", self.side_force, 0.0, 1e6)
             if self.inclination:
                 raise InputError("inclination", self.inclination, "left out beside a side force")
 
-    def torque(self, buoyed_weight: float, radius: float) -> float:
-        """Return the torque of friction per metre, N.
+    def torques(self, buoyed_weight: float, radius: float) -> tuple[float, float]:
+        """Return the torque of friction per metre, N, while it slides and at most at rest.
 
         Parameters
         ----------
@@ -56,13 +61,14 @@ class Wall:
         pressed = self.side_force
         if pressed is None:
             pressed = buoyed_weight * math.sin(self.inclination)
-        return self.friction_factor * pressed * radius
+        most = self.friction_factor if self.static_factor is None else self.static_factor
+        return self.friction_factor * pressed * radius, most * pressed * radius
 
 
 def wall_parts(
-    line: Reduced, sections: list[tuple[float, float]]
-) -> tuple[tuple[FloatArray, float], ...]:
-    """Return the friction on the wall of each part: shares of coordinates in its angle, and torque.
+    line: Reduced, sections: list[tuple[float, float, float]]
+) -> tuple[tuple[FloatArray, float, float], ...]:
+    """Return the friction of each part: shares of coordinates in its angle, torque, and at rest.
 
     The first part is half as long as the others and turns with the bit. There are as many others
     as modes: fewer than coordinates, so that each can be held by itself.
@@ -72,19 +78,23 @@ def wall_parts(
     line : Reduced
         The string in torsion.
     sections : list of tuple
-        Length, m, and torque per metre, N, of each section from the bit up.
+        Length, m, and torques per metre, N, sliding and at rest, of each section from the bit up.
     """
     height, count = line.height, line.shapes.shape[1] - 3
-    ends = np.cumsum([0.0, *(length for length, _ in sections)])
-    sums = np.cumsum([0.0, *(length * torque for length, torque in sections)])
+    lengths, sliding, resting = np.array(sections).T
+    ends = np.cumsum([0.0, *lengths])
     edges = np.concatenate([[0.0], 0.5 * (height[1:] + height[:-1]), height[-1:]])
-    torques = np.diff(np.interp(edges, ends, sums))
+    torques, held = (
+        np.diff(np.interp(edges, ends, np.cumsum([0.0, *(lengths * per_metre)])))
+        for per_metre in (sliding, resting)
+    )
     which = np.minimum(np.floor(height / height[-1] * (count + 0.5) + 0.5).astype(int), count)
     bit = np.eye(line.shapes.shape[1])[0]
-    found = [(bit, float(torques[which == 0].sum()))]
+    found = [(bit, float(torques[which == 0].sum()), float(held[which == 0].sum()))]
     for k in range(1, count + 1):
         here = which == k
         total = float(torques[here].sum())
         if total > 0.0:
-            found.append((torques[here] @ line.shapes[here] / total, total))
+            shares = torques[here] @ line.shapes[here] / total
+            found.append((shares, total, float(held[here].sum())))
     return tuple(found)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from drillctrl import Controller, InputError, OperatingPoint, RigPoint, Scenario, simulate, table1
 from drillctrl.simulation.outcome import figures
+from tests.simulation.fixed_step import BEHIND, THETA, X, motion
 
 POINT = OperatingPoint(5.0, 0.2, 10.0, xi=0.1)
 # Torque that feeds the swing until the bit turns back.
@@ -17,74 +17,19 @@ FED, KICK = 0.4, {"dx": 0.2, "dtheta": 3.0}
 CONTROLLER = Controller("pd", [0.0, FED])
 
 
-@numba.njit
-def euler(point, fed, kick, end, dt):
-    """Integrate with fixed steps; the face by the furthest angle, friction by what it can bear."""
-    omega, delta, psi, eta, xi, kappa, lam, beta, blades = point
-    feed = delta * omega
-    pitch = 2.0 * math.pi / blades
-    before = int(3.0 * pitch / omega / dt)
-    steps = int(end / dt)
-    count = before + steps + 1
-    furthest, place = np.empty(count), np.empty(count)
-    for i in range(before + 1):
-        furthest[i], place[i] = omega * (i - before) * dt, feed * (i - before) * dt
-    x, v, theta, w = 0.0, kick[0], 0.0, kick[1]
-    weight0, torque0 = psi * blades * delta * pitch + lam, blades * delta * pitch + beta
-    found, j = np.empty((steps + 1, 3)), 0
-    for i in range(before, before + steps + 1):
-        t = (i - before) * dt
-        angle = omega * t + theta
-        furthest[i] = angle if i == 0 else max(furthest[i - 1], angle)
-        place[i] = feed * t + x
-        found[i - before] = x, theta, furthest[i] - angle
-        lag = furthest[i] - pitch
-        while furthest[j + 1] < lag:
-            j += 1
-        share = (lag - furthest[j]) / (furthest[j + 1] - furthest[j])
-        cut = blades * (place[i] - place[j] - share * (place[j + 1] - place[j]))
-        touches = cut > 0.0
-        cut = max(cut, 0.0)
-        resting = furthest[i] > angle
-        # Axial: the wear flat bears what keeps Z' at 0, as far as it can.
-        pull = weight0 - 2.0 * xi * eta * v - eta * eta * x - psi * cut
-        down = feed + v
-        pressed = 0.0
-        if touches:
-            free = (down + dt * pull) / (dt * lam)
-            pressed = min(max(free, 0.0), 1.0)
-        v += dt * (pull - lam * pressed)
-        # Torsion: likewise at Φ' = 0, where cutters ahead bear torque too.
-        turn = torque0 - 2.0 * kappa * w - theta + fed * w
-        speed = omega + w
-        forward = (0.0 if resting else cut) + beta * pressed
-        after = speed + dt * turn
-        if after > dt * forward:
-            after -= dt * forward
-        elif after < -dt * beta * pressed:
-            after += dt * beta * pressed
-        else:
-            after = 0.0
-        x += dt * v
-        w = after - omega
-        theta += dt * w
-    return found
-
-
 def test_a_bit_that_turns_back_moves_as_the_convention_says():
     run = simulate(POINT, CONTROLLER, duration=8.0, initial=KICK, rtol=1e-10)
     assert run.status == "done"
     assert run.summary.reversals == len(run.phases("behind")) >= 1
-    p = POINT
-    groups = (p.omega0, p.delta0, p.psi, p.eta, p.xi, p.kappa, p.lam, p.beta, float(p.blades))
     errors = []
     for dt in (4e-5, 2e-5):
-        found = euler(groups, FED, (KICK["dx"], KICK["dtheta"]), 8.0, dt)
-        times = np.arange(len(found)) * dt
+        found = motion(POINT, gains=(0.0, FED), kick=tuple(KICK.values()), end=8.0, dt=dt)
+        rows = found.rows
+        times = np.arange(len(rows)) * found.gap
         mine = run.at(np.minimum(times, 8.0), ("x", "theta"))
-        errors.append(max(abs(found[:, 0] - mine.x).max(), abs(found[:, 1] - mine.theta).max()))
+        errors.append(max(abs(rows[:, X] - mine.x).max(), abs(rows[:, THETA] - mine.theta).max()))
     # It turns back by 0.04 rad, and the plain program is of first order.
-    assert found[:, 2].max() > 0.04
+    assert rows[:, BEHIND].max() > 0.04
     assert errors[1] < 3e-4
     assert errors[1] < 0.7 * errors[0]
 
@@ -141,6 +86,24 @@ def test_no_run_breaks_off_because_the_bit_turns_back(cutting):
         assert run.status in ("done", "diverges"), (where, controller, options)
         reversals += run.summary.reversals
     assert reversals > 25
+
+
+def test_a_bit_that_turns_back_as_it_sets_off_cuts_on_where_it_turned():
+    where = RigPoint(table1(), 16.374292285980058, 0.0014169194868292984)
+    controller = Controller("case2", [2.7076, 2.6534], [-2.1661, -0.5415], limit=1.0)
+    start = Scenario("rest")
+    # Not without end if it stands where the face behind it begins.
+    run = simulate(where, controller, scenario=start, duration=4.0, rtol=1e-9, time_limit=60.0)
+    assert run.status == "done"
+    ((back, resumed),) = (run.phases("behind")[0],)
+    assert back == 0.0
+    times = np.linspace(resumed + 1.0, 4.0, 101)[1:]
+    motion = run.at(times, ("theta", "delay", "dtheta"))
+    forward = (run.point.omega0 + motion.dtheta > 0.0) & (motion.delay < times - resumed)
+    assert forward.sum() > 20
+    earlier = run.at((times - motion.delay)[forward], ("theta",))
+    turned = run.point.omega0 * motion.delay[forward] + motion.theta[forward] - earlier.theta
+    np.testing.assert_allclose(turned, 0.5 * math.pi, atol=1e-6)
 
 
 def test_energy_of_a_bit_that_turns_back():

@@ -35,6 +35,7 @@ LENGTH, SPEED, KICK = 2000.0, 2.0, 8.0
 STEEL = Material(8000.0, 200e9, 77e9)
 PIPE = Section("pipe", "pipe", LENGTH, 0.127, 0.108, material=STEEL)
 RUBBED = Wall(0.2, side_force=60.0)
+STICKY = dataclasses.replace(RUBBED, static_factor=0.4)
 
 
 def string_with(wall):
@@ -57,17 +58,20 @@ def off_rock(wall, blocks=(), **resolution):
     return as_case(RigPoint(rig, SPEED, 1e-5), plant), rig.time_scale
 
 
-def swing(wall, duration=8.0, **options):
+def swing(wall, duration=8.0, frequency=None, **options):
     """A swing in the first torsional mode, by KICK at the bit; and its unit of time."""
-    case, unit = off_rock(wall)
+    case, unit = off_rock(wall, torsional_frequency=frequency)
     line = string_with(None).torsion
     mode = math.sqrt(2.0 / (LENGTH * line.stretches[0].mean().mass))
     start = Scenario(initial={"dtheta": KICK * unit, "dtheta1": KICK * unit / mode})
     return simulate(case, scenario=start, duration=duration / unit, rtol=1e-6, **options), unit
 
 
-def swing_of_elements(times, size, slip):
-    """Angle of the bit on elements, by an implicit solver, with friction made smooth."""
+def swing_of_elements(times, size, slip, most=1.0):
+    """Angle of the bit on elements, by an implicit solver, with friction made smooth.
+
+    At rest it is ``most`` times what it is sliding.
+    """
     chain = elements(string_with(RUBBED).torsion, size)
     count = chain.height.size - 1
     mass, damping, stiffness = (
@@ -81,11 +85,16 @@ def swing_of_elements(times, size, slip):
 
     def rates(_, state):
         angle, rate = np.split(state, 2)
-        friction = torque * (1.0 - np.tanh((rate + SPEED) / slip))
+        turning = (rate + SPEED) / slip
+        more = (most - 1.0) * np.exp(-((turning / 8.0) ** 2))
+        friction = torque * (1.0 - np.tanh(turning) * (1.0 + more))
         return np.concatenate([rate, inverse @ (friction - damping @ rate - stiffness @ angle)])
 
     def slopes(_, state):
-        falls = torque / (slip * np.cosh(np.clip((state[count:] + SPEED) / slip, -30.0, 30.0)) ** 2)
+        turning = np.clip((state[count:] + SPEED) / slip, -60.0, 60.0)
+        more = (most - 1.0) * np.exp(-((turning / 8.0) ** 2))
+        falls = (1.0 + more) / np.cosh(turning) ** 2 - np.tanh(turning) * more * turning / 32.0
+        falls *= torque / slip
         lower = inverse @ np.hstack([stiffness, damping + np.diag(falls)])
         return np.vstack([np.hstack([nothing, np.eye(count)]), -lower])
 
@@ -106,6 +115,37 @@ def test_a_swing_decays_as_that_of_elements_with_friction_made_smooth(rubbed):
     theirs = swing_of_elements(times, 50.0, 2e-3)
     # What parts and elements leave open is a hundredth of the swing.
     np.testing.assert_allclose(run.at(times / unit).theta, theirs, atol=0.02)
+
+
+@pytest.mark.long
+def test_what_holds_more_at_rest_stands_longer_as_elements_do():
+    run, unit = swing(STICKY, duration=1.2, frequency=40.0)
+    times = np.array([0.6, 1.2])
+    theirs = swing_of_elements(times, 100.0, 4e-3, most=2.0)
+    mine = run.at(times / unit).theta
+    np.testing.assert_allclose(mine, theirs, atol=0.004)
+    plain = swing(RUBBED, duration=1.2)[0].at(times / unit).theta
+    assert mine[1] > plain[1] + 0.05
+    assert run.unsettled == 0
+
+
+@pytest.mark.parametrize(("wall", "most"), [(RUBBED, 1.0), (STICKY, 2.0)])
+def test_the_bit_s_own_part_breaks_away_at_its_torque_at_rest(wall, most):
+    case, unit = off_rock(wall)
+    start = Scenario("rest")
+    run = simulate(case, scenario=start, duration=6.0 / unit, rtol=1e-6, max_step=1e-3 / unit)
+    arrays = run.structure.arrays
+    (freed,) = [event.time for event in run.events if event.name == "release"][:1]
+    times = np.append(np.linspace(0.0, freed, 2001)[:-1], freed + 1e-6)
+    motion = run.at(times, (*run.state_names, "ddtheta", "torque_on_bit"))
+    step = np.searchsorted(run.history.real[:, 0], motion.times, side="right") - 1
+    torques = run.history.real[step][:, 1 - len(arrays.side_torque) :].T
+    moved = arrays.A[3] @ np.array([getattr(motion, name) for name in run.state_names])
+    own = motion.ddtheta - moved - arrays.side_force[3, 1:] @ torques
+    friction = own / arrays.E[3, 1] + arrays.top_torque - arrays.side_torque[1:].sum()
+    friction = (friction - motion.torque_on_bit) / arrays.side_torque[0]
+    assert most * 0.95 < friction[:-1].max() <= most * (1.0 + 1e-9)
+    assert friction[-1] == pytest.approx(1.0)
 
 
 def test_halving_the_steps_of_friction_changes_little():
@@ -212,7 +252,7 @@ def test_torques_follow_from_weight_and_hole():
 
 def test_a_rig_with_friction_is_written_and_read(tmp_path):
     rig = string_preset("vertical-3000")
-    walls = Wall(0.2, inclination=0.5), RUBBED
+    walls = Wall(0.2, inclination=0.5), STICKY
     sections = tuple(
         dataclasses.replace(section, wall=walls[i % 2])
         for i, section in enumerate(rig.string.sections)
@@ -230,6 +270,8 @@ def test_a_rig_with_friction_is_written_and_read(tmp_path):
         ("friction_factor = 0.2", "inclination or side_force"),
         ('inclination = "20 deg"', "friction_factor"),
         ('friction_factor = 3.0\ninclination = "20 deg"', "friction_factor"),
+        ('friction_factor = 0.3\nstatic_factor = 0.2\ninclination = "20 deg"', "static_factor"),
+        ('static_factor = 0.2\ninclination = "20 deg"', "friction_factor"),
         ('friction_factor = 0.2\ninclination = "20 deg"\nside_force = "9 N/m"', "inclination"),
     ],
 )

@@ -126,8 +126,7 @@ def retrace(settings, history, steps, chain, following, passes, t, theta, tolera
     if settings.whole[MULTIPLE] == 0 or history.whole[j, CONTACT] == 1:
         return 1
     now = history.whole[j, PASSES] + 1
-    # The first step is motion without end, from which no search goes forward.
-    start = min(max(chain[FAR] if now == passes else history.whole[j, FACE], 1), last)
+    start = min(chain[FAR] if now == passes else history.whole[j, FACE], last)
     extra = (now - 1) * pitch
     j = step_before_angle(history, settings.bit, start, t, theta, extra, tolerance)
     chain[FAR], following[FAR] = j, j + 1

@@ -47,14 +47,14 @@ PIVOTS = 3
 ROWS = PIVOT + PIVOTS
 # Entries of ``Settings.real``. Weight and torque on bit and depth of cut in steady drilling;
 # what the accelerations of the bit gain by weight, E[1, 0], and by torque, E[3, 1]; and behind
-# the clock the friction of the bit's part of the string on the wall.
+# the clock the friction of the bit's part of the string on the wall, sliding and at rest.
 WEIGHT, TORQUE, CUT, BY_WEIGHT, BY_TORQUE = 0, 1, 2, 3, 4
 # The controller's clock; errors allowed; constant delays of the linear model and of the
 # measured signal, 0 where there is none; bounds of x' and θ' (two each: at t = 0, and what
 # they gain by time); size of each event function, to tell zero from rounding, and that of the
 # last ones: the limits of inputs (m) and of their rates (m).
 T_ON, MEASURE_DELAY, PERIOD, LAG_TIME, RTOL, ATOL, LAGS = 5, 6, 7, 8, 9, 10, 11
-BOUNDS, WALL, SCALE = 13, 17, 18
+BOUNDS, WALL, WALL_HELD, SCALE = 13, 17, 18, 19
 LIMITS = SCALE + AT_LIMIT
 # Columns of `schedule`.
 SINCE, PAST_AGE = 0, 1
@@ -151,9 +151,9 @@ class Settings(NamedTuple):
         Motion of the top end beyond V0 t and Ω0 t, and rock strength, by pieces.
     noise : array, (k, f)
         Added to the k-th sample of these outputs.
-    side : array, (k, n + 2 + 2 k)
-        Of each part that rubs: speed per state, and per speed of the top end; torque; acceleration
-        by the torque of each, the bit free to turn; and the bit held.
+    side : array, (k, n + 3 + 2 k)
+        Of each part that rubs: speed per state, and per speed of the top end; torque sliding, and
+        at most at rest; acceleration by the torque of each, the bit free to turn; and the bit held.
     """
 
     bit: Any

@@ -215,7 +215,7 @@ def step_before_angle(history, bit, j, t, theta, extra, tolerance):
     ):
         j -= 1
     while gains_no_angle(history, j) or (
-        j > 0 and beyond(history, bit, j, 1.0, t, theta, extra) >= -tolerance
+        beyond(history, bit, j, 1.0, t, theta, extra) >= -tolerance
     ):
         j += 1
     return j

@@ -61,11 +61,13 @@ from .switch import next_mode, next_saturation, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
- REJECTED, EVALUATIONS, I_SATURATED, I_BEHIND, LAG0) = range(16)  # fmt: skip
+ REJECTED, EVALUATIONS, UNSETTLED, I_SATURATED, I_BEHIND, LAG0) = range(17)  # fmt: skip
 TIME, STEP, NEXT_SAMPLE, TURNED_T, TURNED_THETA, REALS = range(6)
 REFINE = 6
 # A break that is nearer than this, relative to the angle turned, is met.
 PASSED = 5e-14
+# Tries without a step after which no step is to be had.
+MOST_TRIES = 1000
 
 
 @inner
@@ -245,6 +247,9 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             return MORE_ROOM
         if ints[I_TORSION] == REVERSE and settings.whole[BACKWARDS] == 0:
             return REVERSED
+        ints[STALLS] += 1
+        if ints[STALLS] > MOST_TRIES:
+            return COLLAPSE
         mode = mode_of(ints, reals, chain)
         level = ints[I_LEVEL]
         if not known:
@@ -281,8 +286,12 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         h = max(h, 1e-15 * max(1.0, abs(t)))
         # A step that an event cuts short is no time in which to stop what moves.
         reach = max(h, reals[STEP])
-        if fresh and hold_sides(settings, mode, reach, y, k[0], work.vectors[BETWEEN]):
-            rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+        if fresh and settings.whole[SIDES] > 0:
+            held, settled = hold_sides(settings, mode, reach, y, k[0], work.vectors[BETWEEN])
+            if held:
+                rate_of_change(settings, history, steps, mode, t, y, k[0], stages[0])
+            if not settled:
+                ints[UNSETTLED] += 1
         fresh = False
 
         error = attempt(settings, history, steps, mode, t, h, y, work)
@@ -342,9 +351,6 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         if kind >= 0:
             if where * h < SHORTEST * max(1.0, abs(t)):
                 # Negative from the start: no step, another mode.
-                ints[STALLS] += 1
-                if ints[STALLS] > 20:
-                    return COLLAPSE
                 snap(kind, y, bit)
                 enter(settings, history, steps, ints, reals, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
@@ -357,9 +363,9 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
                     ints[REJECTED] += 1
                     continue
                 reached, at_goal = -1, False
-        ints[STALLS] = 0
 
         # Accept.
+        ints[STALLS] = 0
         t = goal if at_goal else t + h
         for i in range(size):
             y[i] = new[i]

@@ -50,6 +50,7 @@ from .data import (
     STUCK,
     TORQUE,
     WALL,
+    WALL_HELD,
     WEIGHT,
 )
 from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
@@ -325,6 +326,7 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
         Weight, and torque of rock and wall.
     """
     by_weight, by_torque, wall = real[BY_WEIGHT], real[BY_TORQUE], real[WALL]
+    hold = real[WALL_HELD] if torsion == STUCK else wall
     axial -= by_weight * real[WEIGHT]
     angular -= by_torque * (real[TORQUE] + wall)
     weight, torque, pressed = 0.0, 0.0, 0.0
@@ -346,15 +348,15 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
             torque = light[1] + pressed * (full[1] - light[1])
         else:
             weight, torque = light
-    probe[P_FORWARD] = angular + by_torque * (torque + wall)
+    probe[P_FORWARD] = angular + by_torque * (torque + hold)
     whole = torque - wall if torsion == REVERSE else torque + wall
     if torsion == STUCK:
         back = 0.0
         if contact == 1:
             back = load((0.0, pressed, -1.0), speeds, law)[1]
-        probe[P_REVERSE] = angular + by_torque * (back - wall)
+        probe[P_REVERSE] = angular + by_torque * (back - hold)
         whole = -angular / by_torque
-        torque = whole if wall == 0.0 else min(max(whole, back), torque)
+        torque = whole if hold == 0.0 else min(max(whole, back), torque)
     probe[P_PRESSED], probe[P_WEIGHT], probe[P_TORQUE] = pressed, weight, torque
     return weight, whole
 
