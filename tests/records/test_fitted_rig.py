@@ -8,6 +8,7 @@ import pytest
 from drillctrl import (
     Estimate,
     InputError,
+    Record,
     RecordFit,
     RigPoint,
     check_rig,
@@ -19,8 +20,12 @@ from drillctrl import (
     table1,
 )
 from drillctrl.designs.worst_case import fitted_box
+from drillctrl.records.damping import damping_apart
 from drillctrl.records.families import line_of, scaled
+from drillctrl.records.surface import Carrier
 from drillctrl.strings.files import fitted_errors
+from tests.records.other_rig import RPM
+from tests.records.wave_rig import WaveRig, wave_recorded
 
 
 def fit_of(rig, stiffer=1.1, heavier=0.95, damping=0.2):
@@ -129,3 +134,18 @@ def test_what_is_not_known_is_not_written(tmp_path):
     path.write_text(path.read_text().replace("error = 0.0", "error = 7.0"))
     with pytest.raises(InputError, match="fit.uncertainty"):
         fitted_errors(path)
+
+
+def test_damping_is_told_apart_from_the_form_of_the_law(tmp_path):
+    # The bit's torque falls as no law that is fitted; the search begins at twice the damping.
+    rig = WaveRig(length=2400.0, damping=0.15, soft=3.0)
+    time, top, torque, _ = wave_recorded(rig, 80.0, 200.0, seed=4)
+    record = Record("memory", time[1], {"rotary_speed": top * RPM, "torque": torque})
+    (tmp_path / "rig.toml").write_text(rig.toml(damping=2.0 * rig.damping))
+    line = load_rig(tmp_path / "rig.toml").string.torsion
+    value, error = damping_apart(record, Carrier(line, rig.drive, 0.02), 2.0 * rig.damping)
+    assert value == pytest.approx(rig.damping, rel=0.25)
+    assert 0.02 < error < 0.4
+    # A bit that never stands tells nothing.
+    steady = record.values | {"torque": torque.mean() + 0.01 * (torque - torque.mean())}
+    assert damping_apart(replace(record, values=steady), Carrier(line), 0.15) is None
