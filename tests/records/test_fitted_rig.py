@@ -1,5 +1,6 @@
 """The rig that a recording tells, as a file, and the box that worst-case design takes from it."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from drillctrl import (
     RigPoint,
     check_rig,
     cli,
+    example_path,
     fitted_rig,
     load_rig,
     save_fit,
@@ -23,7 +25,9 @@ from drillctrl.designs.worst_case import fitted_box
 from drillctrl.records.damping import damping_apart
 from drillctrl.records.families import line_of, scaled
 from drillctrl.records.surface import Carrier
+from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.files import fitted_errors
+from drillctrl.strings.slopes import mode_slopes
 from tests.records.other_rig import RPM
 from tests.records.wave_rig import WaveRig, wave_recorded
 
@@ -88,7 +92,8 @@ def test_the_box_of_worst_case_design(tmp_path):
     rig = table1()
     save_fit(rig, fit_of(rig), tmp_path / "fitted.toml")
     errors = fitted_errors(tmp_path / "fitted.toml")
-    assert errors == {"stiffness": pytest.approx(0.02), "inertia": pytest.approx(0.03)}
+    known = {"stiffness": 0.02, "inertia": 0.03, "damping": 0.2}
+    assert errors == pytest.approx(known)
     assert fitted_errors("table1") == fitted_errors("vertical-3000") == {}
     box = fitted_box(errors)
     # The groups of a rig at the corner of its intervals, to first order.
@@ -117,6 +122,39 @@ def test_the_box_is_taken_and_told_on_the_command_line(tmp_path, capsys):
     assert found[0][0] == found[1][0]
     assert "psi by 5.0 %, delta0 by 2.0 %, omega0 by 2.5 %" in found[0][1]
     assert found[1][1] == ""
+
+
+def test_laws_of_a_top_drive_are_held_against_the_box(tmp_path, capsys):
+    rig = load_rig(example_path("rig"))
+    path = str(tmp_path / "fitted.toml")
+    save_fit(rig, fit_of(rig), path)
+    made = load_rig(path)
+    asked = ["design", "--rig", path, "--structure", "soft-torque", "--objective", "worst-case"]
+    with pytest.raises(SystemExit):
+        cli.main([*asked, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert found["stable"] is True
+    assert found["objective"] == "worst-case"
+    # Rigs at the corners, made as a fit makes them, under the law that is told.
+    pipe, first = made.string.torsion.wave_impedance, check_rig(made).torsional[0].frequency
+    there = []
+    for corner in found["box"]:
+        assert corner["damping"] == pytest.approx(0.8)
+        there.append(fitted_rig(made, fit_of(made, corner["stiffness"], corner["inertia"], 0.16)))
+    assert len({(rig.torsional_stiffness, rig.inertia) for rig in there}) == 4
+
+    def slopes(times):
+        law = soft_torque_control(made.drive, pipe, first, times)
+        return [min(m.slope for m in mode_slopes(rig.string.torsion, law)) for rig in there]
+
+    own = [corner["slope"] for corner in found["box"]]
+    told = found["law"]["speed"]["numerator"][0]
+    assert slopes(told / pipe) == pytest.approx(own, rel=1e-3)
+    assert min(own) >= max(min(slopes(times)) for times in (1.5, 2.2, 3.2, 4.0, 4.6, 5.5)) * 0.98
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*asked[:2], "vertical-3000", *asked[3:]])
+    assert stop.value.code == 2
+    assert "fitted to a recording" in capsys.readouterr().err
 
 
 def test_what_is_not_known_is_not_written(tmp_path):
