@@ -78,7 +78,7 @@ def _drilling(options: Mapping[str, Any]) -> Drilling | None:
     if options["objective"] is None:
         return None
     if options["objective"] != "drilling":
-        wanted = "drilling, or left out: laws of a top drive have no other"
+        wanted = "drilling, or left out"
         raise InputError("--objective", options["objective"], wanted)
     given = {name: options.get(name) for name in ("kick", "modes")}
     known = {name: value for name, value in given.items() if value is not None}
@@ -144,15 +144,21 @@ def deliver_drive_design(
         If an option is missing, wrong, or one that does not bear on drives.
     """
     dynamic = structure.startswith("dynamic-")
-    objective = _drilling(point)
-    own = (*(["depth_error"] if dynamic else []), *(_DRILLING if objective else ()))
+    worst = point.get("objective") == "worst-case"
+    objective = None if worst else _drilling(point)
+    own = ("objective",) if worst else ("depth_error",) if dynamic else ()
+    own = (*own, *(_DRILLING if objective else ()))
     _refuse_others(structure, (*_DESIGN_BEARS, *own))
     if point.get("rig") is None:
         raise InputError("--rig", "(missing)", "given: drives turn a string")
     from drillctrl.designs.drive_design import design_drive
-    from drillctrl.strings.files import load_rig
+    from drillctrl.strings.files import fitted_errors, load_rig
 
     drills = any(point.get(name) is not None for name in _POINT[1:])
+    box = fitted_errors(point["rig"]) if worst else {}
+    if worst and not box:
+        wanted = "with a rig fitted to a recording (record --fit), whose uncertainty is the box"
+        raise InputError("--objective", "worst-case", wanted)
     where: Any = read_point(dict(point)) if drills else load_rig(point["rig"])
     error = point.get("depth_error")
     found = design_drive(
@@ -163,6 +169,7 @@ def deliver_drive_design(
         trials=drills and trials,
         workers=workers,
         keep=point.get("keep"),
+        box=box,
     )
     units = point.get("units") or "si"
     text = functools.partial(found.summary, units)

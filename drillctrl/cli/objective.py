@@ -36,8 +36,9 @@ def objective_options(command: Command) -> Command:
             "--objective",
             help="exact: α; drilling: growth of torsional swings on the motion that is drilled "
             "with (laws of a top drive: the bit is shaken least); semidiscrete: ρ(D); worst-case: "
-            "largest α when the point is off; robust: largest Re s when the plant's matrices are "
-            "off. Without it exact, and drilling where that does not stabilise.",
+            "largest α when the point is off (by its own errors where a record was fitted, of a "
+            "top drive too); robust: largest Re s when the plant's matrices are off. Without it "
+            "exact, and drilling where that does not stabilise.",
         ),
         click.option("--m", type=int, help="Intervals (semidiscrete; default 40)."),
         click.option("--order", type=int, help="0, 1 or 2 (semidiscrete; default 0)."),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from drillctrl.designs.drive_trials import DriveTrials, best_tried, drive_trials
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
+from drillctrl.strings.drive_box import Corner, box_told, corners
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drive_measures import DriveMeasures
 from drillctrl.strings.drive_tuned import TUNED
@@ -62,6 +64,8 @@ class DriveDesign:
         the string alone.
     elapsed_seconds : float
         Wall time.
+    box : tuple of Corner
+        What the law is worth at the corners of what is known of the string.
     """
 
     found: DriveComparison
@@ -71,6 +75,7 @@ class DriveDesign:
     trials: tuple[DriveTrials, ...]
     motion: DriveMotion | None
     elapsed_seconds: float
+    box: tuple[Corner, ...] = ()
 
     @property
     def drive(self) -> DriveMeasures:
@@ -79,8 +84,9 @@ class DriveDesign:
 
     @property
     def stable(self) -> bool:
-        """Whether it is stable with a free bit, and at the point if there is one."""
-        return self.drive.stable and (self.drilling is None or self.drilling.stable)
+        """Whether it is with a free bit, at the point if there is one and at all corners."""
+        held = all(corner.stable for corner in self.box)
+        return self.drive.stable and held and (self.drilling is None or self.drilling.stable)
 
     @property
     def recommended(self) -> bool | None:
@@ -110,6 +116,8 @@ class DriveDesign:
         # Of the drive, where the bit is free; ``drilling`` says so of the point.
         fields["pipe_impedance"] = whole["impedance"]
         fields["impedance"] = self.drive.to_dict()["impedance"]
+        objective = "worst-case" if self.box else "critical-slope"
+        objective = objective if self.motion is None else "drilling"
         drilling = None
         if self.drilling is not None:
             drilling = self.drilling.to_dict()
@@ -123,7 +131,8 @@ class DriveDesign:
             "recommended": self.recommended,
             "reason": self.reason,
             "asked": self.asked,
-            "objective": "critical-slope" if self.motion is None else "drilling",
+            "objective": objective,
+            **({"box": [corner._asdict() for corner in self.box]} if self.box else {}),
             "on_motion": self.motion and self.motion.to_dict(),
             "trials": [each.to_dict() for each in self.trials],
             "drilling": drilling,
@@ -145,6 +154,8 @@ class DriveDesign:
         # What a comparison advises may be another than what runs bore out.
         _, table = self.found.summary(units).split("\n\n", 1)
         lines = [wrapped(first), "", table]
+        if self.box:
+            lines += ["", wrapped(f"Over what is known of the string: {box_told(self.box)}.")]
         if self.drilling is not None:
             said = self.drilling
             lines += ["", f"At the point: {self._outcome(said)}"]
@@ -182,6 +193,7 @@ def design_drive(
     trials: bool = False,
     workers: int = 1,
     keep: str | Path | None = None,
+    box: Mapping[str, float] | None = None,
 ) -> DriveDesign:
     """Find the law of a top drive, by the rule of its name or by optimisation.
 
@@ -208,6 +220,10 @@ def design_drive(
         Processes that share the runs.
     keep : str or Path, optional
         A folder in which what was measured of the bit is kept, and looked for.
+    box : mapping, optional
+        Relative errors of the string's ``stiffness``, ``inertia`` and ``damping``, as of one
+        fitted to a recording: laws are held against its corners, and those that have something
+        to tune are tuned to them instead of to shorter and longer strings.
 
     Returns
     -------
@@ -231,9 +247,11 @@ def design_drive(
             wanted = f"used with {', '.join(ON_LOAD)}: {structure} has nothing to tune"
             raise InputError("objective", objective.name, wanted)
         bit = bit_load(where, objective, workers=workers, keep=keep)
-    laws = [drive_control(structure, rig, length_error, bit)]
+        if box:
+            raise InputError("box", f"{len(box)} errors", f"left out with {objective.name}")
+    laws = [drive_control(structure, rig, length_error, bit, box)]
     if trials and isinstance(where, RigPoint) and structure.startswith("dynamic-"):
-        laws += [drive_control(TUNED, rig, length_error, bit), drive_control("z-torque", rig)]
+        laws += [drive_control(name, rig, box=box) for name in (TUNED, "z-torque")]
     found = compare_drives(rig, laws, falling)
     tried: tuple[DriveTrials, ...] = ()
     if trials and isinstance(where, RigPoint):
@@ -253,5 +271,6 @@ def design_drive(
         drilling = analyze(case)
         modes = named_roots(case, None, drilling.K1, drilling.K2)
     return DriveDesign(
-        found, drilling, modes, structure, tried, motion, time.perf_counter() - began
-    )
+        found, drilling, modes, structure, tried, motion, time.perf_counter() - began,
+        corners(rig.string.torsion, box, found.drives[0].control) if box else (),
+    )  # fmt: skip

@@ -195,7 +195,9 @@ def choose_columns(
                 raise
             notes.append(f"{quantity} was not taken: {error.parameter} {error.permitted}")
     _check_needed(found, choices, listed, source)
-    times = [column for column in candidates.get(TIME, []) if TIME not in choices]
+    # What holds instants by its kind needs no name for it.
+    dated = [column for column in columns if column.unit == "epoch"]
+    times = [column for column in candidates.get(TIME, dated) if TIME not in choices]
     return {**found, **_time(times, found, listed, source)}, notes
 
 

@@ -73,21 +73,14 @@ class Family:
 
 def scaled(line: Line, stiffer: float, heavier: float, damping: float) -> Line:
     """Return a line stiffer and heavier by factors, with another viscous damping, 1/s."""
-    return Line(
-        tuple(
-            Stretch(
-                tuple(_changed(piece, stiffer, heavier, damping) for piece in stretch.pieces),
-                stretch.repeats,
-            )
-            for stretch in line.stretches
+
+    def changed(piece: Piece) -> Piece:
+        mass = heavier * piece.mass
+        return piece._replace(
+            mass=mass, stiffness=stiffer * piece.stiffness, damping=damping * mass
         )
-    )
 
-
-def _changed(piece: Piece, stiffer: float, heavier: float, damping: float) -> Piece:
-    """Return a piece with other numbers; see `scaled`."""
-    mass = heavier * piece.mass
-    return piece._replace(mass=mass, stiffness=stiffer * piece.stiffness, damping=damping * mass)
+    return line.changed(changed)
 
 
 def pipe_and_disc(stiffness: float, pipe: float, disc: float, damping: float) -> Line:

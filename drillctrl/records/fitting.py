@@ -12,6 +12,7 @@ from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
+from drillctrl.records.damping import damping_apart
 from drillctrl.records.descent import LAW, Descent, descend, with_sharper_law
 from drillctrl.records.downhole import (
     Prepared,
@@ -217,13 +218,21 @@ def _with_method(
     of_law, of_string = _METHOD, _STRING_METHOD
     if family.base is None:
         of_law, of_string = _UNKNOWN_METHOD, _UNKNOWN_STRING
+    spread = found.spread + np.outer(moved, moved)
+    place = found.names.index("damping")
+    apart = None if family.single else damping_apart(record, carrier, found.value("damping"))
+    if apart is not None:
+        found.values[place] = apart[0]
+        spread[place], spread[:, place] = 0.0, 0.0
+        spread[place, place] = apart[1] ** 2
     found = with_sharper_law(found, family, wide.stretches, wide.units, inertia, late, wide.margin)
     method = [of_law.get(name, of_string) ** 2 for name in found.names]
-    fastest = 2.0 * float(np.nanmean(record.values["rotary_speed"]))
-    inertia_below = family.effective(found.values.tolist())[1]
-    slope = found.value("drop") / (fastest * found.value("damping") * inertia_below)
-    method[found.names.index("damping")] += (_MISSED_SLOPE * slope) ** 2
-    return replace(found, spread=found.spread + np.outer(moved, moved) + np.diag(method))
+    if apart is None:
+        fastest = 2.0 * float(np.nanmean(record.values["rotary_speed"]))
+        inertia_below = family.effective(found.values.tolist())[1]
+        slope = found.value("drop") / (fastest * found.value("damping") * inertia_below)
+        method[place] += (_MISSED_SLOPE * slope) ** 2
+    return replace(found, spread=spread + np.diag(method))
 
 
 def _told(

@@ -12,6 +12,8 @@ from drillctrl.base.arrays import FloatArray
 _STANDS = 10.0
 # So many times the width of nearly all values outside of them, in at most this share: no motion.
 _FAR, _FEW = 3.0, 0.002
+# No string is turned faster, rad/s.
+_FAST = 35.0
 # Two columns that both change so many-fold from one stretch of so many seconds to the next.
 _FOLD, _STRETCH = 5.0, 10.0
 # A leap is so many times what moves beside it.
@@ -51,6 +53,11 @@ def without_spikes(
             notes.append(f"{count} of {told} far beyond all others left out, from {at:g} s on")
         notes += _standing(times, data, told)
         notes += _turned(times, kept[name], told)
+    fast = float(np.nanmedian(np.abs(rows.get("rotary_speed", np.zeros(1)))))
+    if fast > _FAST:
+        notes.append(
+            f"rotary speed is {fast * 30.0 / np.pi:.0f} rpm in the median: is its unit so?"
+        )
     if "torque" in rows:
         notes += _shifted(times, kept["torque"], step)
     return kept, [*notes, *_mixed(times, rows, step)]

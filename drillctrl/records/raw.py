@@ -127,6 +127,9 @@ def _read_mat(path: Path) -> list[Column]:
             continue
         values = doubles(opened(kind, data, bound(size)), array.shape)
         found.append(Column(name, None, values))
+    if not found:
+        wanted = f"a vector of numbers a column; {', '.join(mat_places(path))[:80]} is none"
+        raise InputError("record", str(path), wanted)
     return found
 
 

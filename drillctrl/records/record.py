@@ -31,6 +31,10 @@ _MOST_SAMPLES = 20_000_000
 # A gap is longer than so many steps.
 _GAP = 5.0
 _POINT, _THOUSANDS = re.compile(r"[-+]?\d+\.\d+"), re.compile(r"[-+]?\d{1,3}(,\d{3})+")
+# So many times as many rows go back in time as go on: a file in reverse.
+_REVERSED = 3.0
+# More than this share of rows that go back, and as many that repeat a time, are no times.
+_NO_TIMES = 0.2
 # Fewer stamps than this do not tell how far apart they are.
 _STAMPS = 4
 DATES = ("day-first", "month-first")
@@ -196,16 +200,17 @@ def _even(
     rows = {name: data[known] for name, data in values.items()}
     if times.size < _FEWEST_ROWS:
         raise InputError("record", source, f"at least {_FEWEST_ROWS} rows with a time")
-    falling = int((np.diff(times) < 0.0).sum())
-    if falling:
+    steps = np.diff(times)
+    if (steps < 0.0).sum() > _REVERSED * (steps > 0.0).sum():
+        notes.append("the rows stood in reverse and were turned round")
+        times, rows = times[::-1], {name: data[::-1] for name, data in rows.items()}
+    if falling := int((np.diff(times) < 0.0).sum()):
+        notes.append(f"time went back at {falling} rows; rows were sorted by time")
         order = np.argsort(times, kind="stable")
-        backwards = falling == (np.diff(times) != 0.0).sum()
-        if backwards:
-            order = np.argsort(times[::-1], kind="stable")
-            order = times.size - 1 - order
-            notes.append("the rows stood in reverse and were turned round")
-        else:
-            notes.append(f"time went back at {falling} rows; rows were sorted by time")
+        alike = int((np.diff(times[order]) == 0.0).sum())
+        if min(falling, alike) > _NO_TIMES * times.size:
+            wanted = f"rising: it goes back at {falling} of {times.size} rows. Are these times?"
+            raise InputError(f"times of {source}", f"{alike} rows alike", wanted)
         times, rows = times[order], {name: data[order] for name, data in rows.items()}
     times, rows, more = _without_repeats(times, rows)
     notes += more

@@ -23,6 +23,11 @@ _ABSENT = (-999.0, -999.25, -9999.0, -9999.25)
 _PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?", re.ASCII)
 _STAMP = re.compile(r"[\dTZ:./+\- ]*\d[:.\-/]\d[\dTZ:.,/+\- ]*(?:AM|PM|UTC)?", re.IGNORECASE)
+_GROUPED = (
+    re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+", re.ASCII),
+    re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+,\d+", re.ASCII),
+)
+_WITH_UNIT = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([^\W\d_].*)", re.ASCII)
 _MISSING = {"", "nan", "null", "none", "n/a", "na", "-", "--", "nil"}
 
 
@@ -87,7 +92,25 @@ def split_text(content: bytes, source: str) -> Split:
         raise InputError(f"column of {source}", sorted(doubled)[0], "named once in the header")
     cells = [list(column) for column in zip(*kept, strict=True)]
     behind = [None] * width if units is None else [unit or None for unit in units[:width]]
-    return Split(names[:width], list(behind), cells)
+    both = [_without_unit(*each) for each in zip(cells, behind, strict=True)]
+    return Split(names[:width], [unit for _, unit in both], [column for column, _ in both])
+
+
+def _without_unit(cells: list[str], unit: str | None) -> tuple[list[str], str | None]:
+    """Return cells without the one unit that stands behind each number, and that."""
+    from drillctrl.base.units import known_unit
+
+    own = ""
+    for cell in cells:
+        if cell.lower() in _MISSING:
+            continue
+        match = _WITH_UNIT.fullmatch(cell)
+        if match is None or (own and match[2] != own):
+            return cells, unit
+        own = match[2]
+    if unit is not None or not known_unit(own):
+        return cells, unit
+    return [cell.removesuffix(own).rstrip() for cell in cells], own
 
 
 def _decoded(content: bytes, source: str) -> str:
@@ -142,7 +165,8 @@ def _separator(lines: Sequence[str], source: str) -> str | None:
 
 
 def _is_number(cell: str) -> bool:
-    return bool(_PLAIN.fullmatch(cell) or _COMMA.fullmatch(cell))
+    kinds = (_PLAIN, _COMMA, *_GROUPED, _WITH_UNIT)
+    return any(kind.fullmatch(cell) for kind in kinds)
 
 
 def _is_data(row: Sequence[str]) -> bool:
@@ -179,6 +203,12 @@ def numbers_of(cells: Sequence[str], name: str, source: str) -> FloatArray:
     if set("".join(cells)) <= _SIGNS and all(cells):
         with contextlib.suppress(ValueError):
             return known_numbers(np.array(cells, dtype=float))
+    for grouped, sign in zip(_GROUPED, ",.", strict=True):
+        # Both signs in a number tell which one sets thousands apart.
+        if any(grouped.fullmatch(cell) for cell in cells):
+            whole = re.compile(rf"[+-]?(?:\d{{1,3}}(?:\{sign}\d{{3}})+|\d+)(?:[.,]\d+)?")
+            if all(whole.fullmatch(cell) for cell in cells if sign in cell):
+                cells = [cell.replace(sign, "") for cell in cells]
     commas = any(_COMMA.fullmatch(cell) for cell in cells)
     values = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):

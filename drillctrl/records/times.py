@@ -69,6 +69,8 @@ def _in_seconds(
         step = float(np.median(np.abs(np.diff(known)))) if known.size > 1 else 0.0
         if known.size and known[0] > 1e8:
             raise _ask(name, source, f"{known[0]:.0f}", "s or ms since 1970")
+        if known.size and 2e4 < known[0] < 8e4 and step < 1e-3:
+            raise _ask(name, source, f"{known[0]:.6g}", "days, as spreadsheets count: [day]?")
         if not 0.001 <= step <= 2.0:
             raise _ask(name, source, "(missing)", f"rows are {step:g} apart")
         unit = "s"

@@ -8,6 +8,7 @@ part of roots is, and BFGS descends it as it does that.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -264,6 +265,7 @@ def dynamic_drive_control(
     order: int = 2,
     length_error: float = 0.2,
     bit: BitLoad | None = None,
+    others: Sequence[Line] = (),
 ) -> DriveControl:
     """Design dynamic feedback for the largest smallest critical slope of the first four modes.
 
@@ -282,6 +284,9 @@ def dynamic_drive_control(
         What the bit does where it drills: slopes are then what its answer leaves of them, and of
         the laws under which none vanishes the law is that under which the bit is shaken least.
 
+    others : sequence of Line
+        Strings that the design holds for instead of shorter and longer ones.
+
     Returns
     -------
     DriveControl
@@ -294,8 +299,9 @@ def dynamic_drive_control(
     modes, _ = mode_bands(line, MODES)
     rate = 2.0 * math.pi * math.sqrt(float(modes[0] * modes[-1]))
     aim = _AIM * lowest_impedance(line)
-    lengths = (line, *(stretched(line, 1.0 + sign * error) for sign in (-1, 1) if error))
-    loops = [_loop(each, machine, aim, rate, bit) for each in lengths]
+    signs = (-1, 1) if error and not others else ()
+    strings = (line, *others, *(stretched(line, 1.0 + sign * error) for sign in signs))
+    loops = [_loop(each, machine, aim, rate, bit) for each in strings]
     if machine.delay > 0.0:
         later = replace(machine, delay=_LATER * machine.delay)
         loops.append(_loop(line, later, aim, rate, bit))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from drillctrl.strings.slopes import (
 TUNED = "z-torque-tuned"
 # Wanted impedance over ζ: the pipe's own returns nothing, the rule's four times 0.6 of a wave.
 _LEAST, _MOST, _LOOKED = 1.0, 6.0, 9
+_RULE = 4.0
 # Of the largest weakest slope, what the chosen one keeps.
 _KEPT = 0.9
 _MODES = 4
@@ -84,6 +85,30 @@ def tuned_on_load(
         return laws[int(np.argmax(left))]
     good = [law for law, own in zip(laws, left, strict=True) if own > 0.0]
     return min(good, key=lambda law: bit.mean_square(line, law))
+
+
+def tuned_over(lines: Sequence[Line], law_at: Callable[[float], DriveControl]) -> DriveControl:
+    """Return the law whose smallest critical slope over several strings is largest.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        In torsion, the one in the middle first.
+    law_at : callable
+        The law of a wanted impedance over that of the pipe.
+
+    Raises
+    ------
+    InputError
+        If the first string and the drive are unstable under all of these.
+    """
+
+    def worst(law: DriveControl) -> float:
+        if not all(drive_is_stable(line, law) for line in lines):
+            return -np.inf
+        return min(mode.slope for line in lines for mode in mode_slopes(line, law, _MODES))
+
+    return max((law_at(_RULE), *_stable_laws(lines[0], law_at)), key=worst)
 
 
 def _stable_laws(line: Line, law_at: Callable[[float], DriveControl]) -> list[DriveControl]:

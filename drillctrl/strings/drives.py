@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from drillctrl.base.language import told_language
 from drillctrl.base.tableio import csv_text
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.bit_load import BitLoad
+from drillctrl.strings.drive_box import box_lines
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_design import dynamic_drive_control
 from drillctrl.strings.drive_measures import DriveMeasures, measure_drive
@@ -25,7 +26,7 @@ from drillctrl.strings.drive_rules import (
     soft_torque_control,
     z_torque_control,
 )
-from drillctrl.strings.drive_tuned import TUNED, tuned_on_load, tuned_z_torque
+from drillctrl.strings.drive_tuned import TUNED, tuned_on_load, tuned_over, tuned_z_torque
 from drillctrl.strings.drives_words import comparison_summary
 from drillctrl.strings.falling import FallingTorque
 from drillctrl.strings.rig import StringRig
@@ -117,7 +118,11 @@ class DriveComparison:
 
 @checks_kinds
 def drive_control(
-    name: str, rig: StringRig, length_error: float = 0.2, bit: BitLoad | None = None
+    name: str,
+    rig: StringRig,
+    length_error: float = 0.2,
+    bit: BitLoad | None = None,
+    box: Mapping[str, float] | None = None,
 ) -> DriveControl:
     """Return the law of a name for the drive of a rig, designed if it is a dynamic one.
 
@@ -133,6 +138,9 @@ def drive_control(
     bit : BitLoad, optional
         What the bit does where it drills: the laws of `ON_LOAD` are then those under which it
         swings least there.
+    box : mapping, optional
+        Relative errors of the string's ``stiffness``, ``inertia`` and ``damping``: these laws
+        are then those whose smallest critical slope over its corners is largest.
 
     Raises
     ------
@@ -140,14 +148,20 @@ def drive_control(
         If there is no such law, or no top drive.
     """
     machine, line = machine_of(rig), rig.string.torsion
+    others = [each for _, each in box_lines(line, box)] if box else []
     if name in _DYNAMIC:
-        return dynamic_drive_control(line, machine, int(name[-1]), length_error, bit)
-    if bit is not None and name in ON_LOAD:
+        return dynamic_drive_control(line, machine, int(name[-1]), length_error, bit, others)
+    if (bit is not None or others) and name in ON_LOAD:
         pipe, first = line.wave_impedance, first_frequency(rig.string)
-        if name == "soft-torque":
-            return tuned_on_load(line, bit, lambda t: soft_torque_control(machine, pipe, first, t))
-        found = tuned_on_load(line, bit, lambda t: z_torque_control(machine, pipe, t))
-        return replace(found, name=name)
+
+        def law_at(times: float) -> DriveControl:
+            if name == "soft-torque":
+                return soft_torque_control(machine, pipe, first, times)
+            return replace(z_torque_control(machine, pipe, times), name=name)
+
+        if bit is not None:
+            return tuned_on_load(line, bit, law_at)
+        return tuned_over([line, *others], law_at)
     if name == TUNED:
         return tuned_z_torque(line, machine)
     if name in _OBSERVERS:

@@ -173,7 +173,7 @@ def fitted_errors(source: str | Path) -> dict[str, float]:
     known = read_toml(source, "a readable TOML file").get(FIT, {})
     rows = known.get("uncertainty", {}) if isinstance(known, dict) else {}
     found = {}
-    for name in ("stiffness", "inertia"):
+    for name in ("stiffness", "inertia", "damping"):
         row = rows.get(name) if isinstance(rows, dict) else None
         if isinstance(row, dict) and "error" in row:
             where = f"fit.uncertainty.{name}.error in {source}"

@@ -6,6 +6,7 @@ carries (displacement, force) from the upper end to the lower one, at any comple
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -90,6 +91,15 @@ class Line:
     def length(self) -> float:
         """Length in metres."""
         return sum(stretch.length for stretch in self.stretches)
+
+    def changed(self, change: Callable[[Piece], Piece]) -> Line:
+        """Return the line with each of its pieces changed."""
+        return Line(
+            tuple(
+                each._replace(pieces=tuple(change(piece) for piece in each.pieces))
+                for each in self.stretches
+            )
+        )
 
     def transfer(self, s: npt.ArrayLike) -> ComplexArray:
         """Return the transfer matrix from the top to the bit, (..., 2, 2).

@@ -1,5 +1,6 @@
 """The rig that a recording tells, as a file, and the box that worst-case design takes from it."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,12 @@ import pytest
 from drillctrl import (
     Estimate,
     InputError,
+    Record,
     RecordFit,
     RigPoint,
     check_rig,
     cli,
+    example_path,
     fitted_rig,
     load_rig,
     save_fit,
@@ -19,8 +22,14 @@ from drillctrl import (
     table1,
 )
 from drillctrl.designs.worst_case import fitted_box
+from drillctrl.records.damping import damping_apart
 from drillctrl.records.families import line_of, scaled
+from drillctrl.records.surface import Carrier
+from drillctrl.strings.drive_rules import soft_torque_control
 from drillctrl.strings.files import fitted_errors
+from drillctrl.strings.slopes import mode_slopes
+from tests.records.other_rig import RPM
+from tests.records.wave_rig import WaveRig, wave_recorded
 
 
 def fit_of(rig, stiffer=1.1, heavier=0.95, damping=0.2):
@@ -83,7 +92,8 @@ def test_the_box_of_worst_case_design(tmp_path):
     rig = table1()
     save_fit(rig, fit_of(rig), tmp_path / "fitted.toml")
     errors = fitted_errors(tmp_path / "fitted.toml")
-    assert errors == {"stiffness": pytest.approx(0.02), "inertia": pytest.approx(0.03)}
+    known = {"stiffness": 0.02, "inertia": 0.03, "damping": 0.2}
+    assert errors == pytest.approx(known)
     assert fitted_errors("table1") == fitted_errors("vertical-3000") == {}
     box = fitted_box(errors)
     # The groups of a rig at the corner of its intervals, to first order.
@@ -114,6 +124,39 @@ def test_the_box_is_taken_and_told_on_the_command_line(tmp_path, capsys):
     assert found[1][1] == ""
 
 
+def test_laws_of_a_top_drive_are_held_against_the_box(tmp_path, capsys):
+    rig = load_rig(example_path("rig"))
+    path = str(tmp_path / "fitted.toml")
+    save_fit(rig, fit_of(rig), path)
+    made = load_rig(path)
+    asked = ["design", "--rig", path, "--structure", "soft-torque", "--objective", "worst-case"]
+    with pytest.raises(SystemExit):
+        cli.main([*asked, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert found["stable"] is True
+    assert found["objective"] == "worst-case"
+    # Rigs at the corners, made as a fit makes them, under the law that is told.
+    pipe, first = made.string.torsion.wave_impedance, check_rig(made).torsional[0].frequency
+    there = []
+    for corner in found["box"]:
+        assert corner["damping"] == pytest.approx(0.8)
+        there.append(fitted_rig(made, fit_of(made, corner["stiffness"], corner["inertia"], 0.16)))
+    assert len({(rig.torsional_stiffness, rig.inertia) for rig in there}) == 4
+
+    def slopes(times):
+        law = soft_torque_control(made.drive, pipe, first, times)
+        return [min(m.slope for m in mode_slopes(rig.string.torsion, law)) for rig in there]
+
+    own = [corner["slope"] for corner in found["box"]]
+    told = found["law"]["speed"]["numerator"][0]
+    assert slopes(told / pipe) == pytest.approx(own, rel=1e-3)
+    assert min(own) >= max(min(slopes(times)) for times in (1.5, 2.2, 3.2, 4.0, 4.6, 5.5)) * 0.98
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*asked[:2], "vertical-3000", *asked[3:]])
+    assert stop.value.code == 2
+    assert "fitted to a recording" in capsys.readouterr().err
+
+
 def test_what_is_not_known_is_not_written(tmp_path):
     rig, path = table1(), tmp_path / "fitted.toml"
     for fit, word in (
@@ -129,3 +172,18 @@ def test_what_is_not_known_is_not_written(tmp_path):
     path.write_text(path.read_text().replace("error = 0.0", "error = 7.0"))
     with pytest.raises(InputError, match="fit.uncertainty"):
         fitted_errors(path)
+
+
+def test_damping_is_told_apart_from_the_form_of_the_law(tmp_path):
+    # The bit's torque falls as no law that is fitted; the search begins at twice the damping.
+    rig = WaveRig(length=2400.0, damping=0.15, soft=3.0)
+    time, top, torque, _ = wave_recorded(rig, 80.0, 200.0, seed=4)
+    record = Record("memory", time[1], {"rotary_speed": top * RPM, "torque": torque})
+    (tmp_path / "rig.toml").write_text(rig.toml(damping=2.0 * rig.damping))
+    line = load_rig(tmp_path / "rig.toml").string.torsion
+    value, error = damping_apart(record, Carrier(line, rig.drive, 0.02), 2.0 * rig.damping)
+    assert value == pytest.approx(rig.damping, rel=0.25)
+    assert 0.02 < error < 0.4
+    # A bit that never stands tells nothing.
+    steady = record.values | {"torque": torque.mean() + 0.01 * (torque - torque.mean())}
+    assert damping_apart(replace(record, values=steady), Carrier(line), 0.15) is None

@@ -67,6 +67,21 @@ def test_headers_separators_signs_and_encodings(tmp_path):
     check(read(tmp_path, row_of_units))
 
 
+def test_units_in_cells_and_thousands_that_tell_themselves(tmp_path):
+    newtons = [f"{1e3 * value:,.2f}" for value in TORQUE]
+    header = ("Time [s]", "RPM", "Torque [N.m]")
+    turns = [f"{value:.4f} rpm" for value in RPM]
+    check(read(tmp_path, rows(header, texts(TIME, 2), turns, [f'"{cell}"' for cell in newtons])))
+    swapped = [cell.translate(str.maketrans(",.", ".,")) for cell in newtons]
+    times = [cell.replace(".", ",") for cell in texts(TIME, 2)]
+    turns = [f"{value:.4f}".replace(".", ",") for value in RPM]
+    told = ("Time [s]", "RPM [rpm]", "Torque [N.m]")
+    check(read(tmp_path, rows(told, times, turns, swapped, separator=";")))
+    mixed = [f"{value:.4f} {'Hz' if k == 7 else 'rpm'}" for k, value in enumerate(RPM)]
+    with pytest.raises(InputError, match="RPM, row 1"):
+        read(tmp_path, rows(header, texts(TIME, 2), mixed, texts(TORQUE)))
+
+
 def test_field_units_and_what_the_user_says(tmp_path):
     pounds = TORQUE * 1e3 / 1355.8179483314
     text = rows(("A", "B", "C [unknown]"), texts(TIME, 2), texts(RPM), texts(pounds, 6))
@@ -107,6 +122,22 @@ def test_rows_that_repeat_return_or_are_missing(tmp_path):
     check(record)
     assert any("sorted by time" in note for note in record.notes)
     check(read(tmp_path, "\n".join([lines[0], *lines[:0:-1]])))
+    # In reverse but for three rows; and a column that is no time.
+    nearly = [lines[0], *lines[:200:-1], *lines[198:201], *lines[197:0:-1]]
+    record = read(tmp_path, "\n".join(nearly))
+    check(record)
+    assert "the rows stood in reverse and were turned round" in record.notes
+    assert "time went back at 2 rows; rows were sorted by time" in record.notes
+    with pytest.raises(InputError, match="Are these times"):
+        read(
+            tmp_path,
+            rows(
+                ("Time [s]", "RPM", "TQ [kNm]"),
+                texts((17 * np.arange(COUNT)) % 40, 0),
+                texts(RPM),
+                texts(TORQUE),
+            ),
+        )
     record = read(tmp_path, "\n".join([*lines[:101], *lines[161:]]))
     known = np.isfinite(record.values["torque"])
     assert known.sum() == pytest.approx(COUNT - 60, abs=2)
