@@ -17,7 +17,7 @@ from drillctrl.spectrum.characteristic import magnitude_bound
 # Gains of the innermost box make the loop at most this much faster than its plant, those of
 # each further box as much faster again as the second says.
 _FIRST, _FURTHER = 2.0, 4.0
-_HALVINGS = 30
+_HALVINGS, _SHRUNK = 30, 16.0
 
 
 def fastest(
@@ -120,6 +120,9 @@ def _scales(
         if fastest(system, feedback, high[j] * spread[:, j], line) <= speed:
             low[j] = high[j]
             continue
+        # Bounds may be wider than any halving ends at.
+        while not fastest(system, feedback, high[j] / _SHRUNK * spread[:, j], line) <= speed:
+            high[j] /= _SHRUNK
         for _ in range(_HALVINGS):
             middle = 0.5 * (low[j] + high[j])
             quick = fastest(system, feedback, middle * spread[:, j], line) > speed
