@@ -93,6 +93,19 @@ def test_require_stable(capsys):
     assert run(capsys, *base, "--delta0", 1.75)[0] == 0
 
 
+@pytest.mark.parametrize("start", ["steady", "kick", "rest"])
+@pytest.mark.parametrize("duration", ["1e-12", "6.28"])
+def test_a_run_of_less_than_a_swing_says_nothing(capsys, duration, start):
+    arguments = ["simulate", "--duration", duration, "--start", start]
+    status, out, _ = run(capsys, *arguments, "--json")
+    found = json.loads(out)
+    assert (status, found["outcome"], found["settled"]) == (0, "undecided", False)
+    assert found["swing"] is found["feed"] is None
+    told = run(capsys, *arguments)[1]
+    assert "the run ends before it can tell, which takes 6.28" in told
+    assert "settle" not in told.split("Motion")[0]
+
+
 AT_RIG = ("--rig", "table1", "--speed", "120 rpm", "--rop", "20 m/h")
 CONTROLLED = ("simulate", *AT_RIG, "--structure", "p")
 _POINT = ("--rig", "table1", "--speed", "90 rpm", "--rop", "2 m/h")
@@ -130,6 +143,11 @@ BAD = [
     (["analyze", "--nonsense"], "--nonsense"),
     (["simulate", "--duration", "1e12"], "duration = 1000000000000.0"),
     (["simulate", "--rtol", "-1"], "rtol = -1.0"),
+    (["analyze", "--omega0", "10", "--omega0", "11"], "--omega0 = given twice: must be given once"),
+    (["map", "--x", ""], "--x = : must be of the form"),
+    (["reproduce", "fig4", "--out", ""], "--out = : must be a folder"),
+    (["compare", "--structures", ""], "--structures = : must be names"),
+    (["compare", "--structures", "p,,pd"], "--structures = p,,pd: must be names"),
     (["simulate", "--initial", "dtheta=-20"], "initial dtheta = -20.0"),
     (["simulate", "--initial", "dx"], "--initial = dx"),
     (["simulate", "--structure", "case1", "--K1", "1,2", "--K2", "1"], "K1"),

@@ -81,7 +81,9 @@ def compare_command(
       drillctrl compare --rig vertical-3000 --structures stiff,soft-torque,dynamic-2
     """
     check_folder("--out", out)
-    names = [name for name in (part.strip() for part in structures.split(",")) if name]
+    names = [part.strip() for part in structures.split(",")]
+    if not all(names):
+        raise InputError("--structures", structures, "names with a comma between them")
     for_drives = {"plot": plot, "drop": drop, "decay": decay, "objective": objective, "keep": keep}
     if are_drives(names):
         deliver_drives(names, point, for_drives, as_json, out, wants_trials(trials))

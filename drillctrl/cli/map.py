@@ -157,8 +157,8 @@ def map_command(
         if scheduler is not None:
             raise InputError("workers", workers, "left out with --scheduler, which has its own")
     usual = _AXES if options["rig"] is None else _RIG_AXES
-    x, across = read_counted_axis("--x", x_axis or usual[0], _COUNTS[0])
-    y, up = read_counted_axis("--y", y_axis or usual[1], _COUNTS[1])
+    x, across = read_counted_axis("--x", usual[0] if x_axis is None else x_axis, _COUNTS[0])
+    y, up = read_counted_axis("--y", usual[1] if y_axis is None else y_axis, _COUNTS[1])
     _check_weight(options, x[0], y[0])
     given = with_axes(options, x, y)
     where = read_point({name: given[name] for name in options})

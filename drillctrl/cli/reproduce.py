@@ -7,6 +7,7 @@ import textwrap
 
 import click
 
+from drillctrl.base.errors import InputError
 from drillctrl.cli.verb import Verb
 
 
@@ -39,6 +40,8 @@ def reproduce_command(figures: tuple[str, ...], out: str, as_json: bool) -> None
     def show(name: str, done: int, total: int) -> None:
         click.echo(f"{done}/{total} {name}", err=True)
 
+    if not out.strip():
+        raise InputError("--out", out, "a folder")
     rows = reproduce(figures or ("all",), out, show if sys.stderr.isatty() else None)
     if as_json:
         click.echo(rows_as_json(rows), nl=False)

@@ -12,6 +12,7 @@ from drillctrl.simulation.bounds import BEYOND, rate_scales
 from drillctrl.simulation.irregular import irregular
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.status import Outcome, Status
+from drillctrl.simulation.summary import SHORTEST
 
 if TYPE_CHECKING:
     from drillctrl.simulation.result import Simulation
@@ -41,7 +42,7 @@ class Figures:
         ``"does-not-keep-up"``: it falls behind the feed of the top end, or has, so that the
         string presses on it with more than twice the steady weight; ``"stalls"``: it
         stands still; ``"turns-back"``, ``"diverges"``; ``"undecided"``: the run ended before
-        it can tell. All but the last three are of the last quarter.
+        it can tell, or lasted less than 2π. All but the last three are of the last quarter.
     swing : float or None
         Stick-slip index, (max − min)/(2 mean) of the bit's speed in the last quarter; None
         too where the bit stands still.
@@ -123,7 +124,8 @@ def _broken(run: Simulation, motion: Motion) -> Outcome | None:
         return Outcome.DIVERGES
     if run.status == Status.REVERSED:
         return Outcome.TURNS_BACK
-    return None if run.status == Status.DONE else Outcome.UNDECIDED
+    short = float(run.times[-1]) < SHORTEST and not run.phases("reverse")
+    return Outcome.UNDECIDED if short or run.status != Status.DONE else None
 
 
 def _bounded(run: Simulation, tail: Motion, stuck: float, fed: float | None) -> Outcome:

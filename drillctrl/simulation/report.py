@@ -18,6 +18,7 @@ from drillctrl.simulation.loads import loads
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.status import Outcome, Status
+from drillctrl.simulation.summary import SHORTEST
 
 if TYPE_CHECKING:
     from drillctrl.simulation.floquet import Floquet
@@ -84,6 +85,8 @@ def _outcome_text(run: Simulation) -> str:
     """Return what became of the motion in one line."""
     found = figures(run)
     parts = [found.outcome.sentence]
+    if found.outcome is Outcome.UNDECIDED and run.status == Status.DONE:
+        parts.append(f"which takes {_seconds(run, SHORTEST)} at least")
     if found.outcome is not Outcome.CHAOTIC and _irregular(run, found.outcome):
         parts.append("irregularly")
     if found.swing is not None and found.outcome is not Outcome.SETTLES:

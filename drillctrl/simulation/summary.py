@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -18,6 +19,8 @@ SETTLED_WITHIN = 0.02
 RETURNED = 1e-3
 PER_STEP = 9
 MAX_RETURNS = 40
+# A run that lasts no period of the torsional pendulum shows no motion that goes on.
+SHORTEST = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Summary:
     ----------
     settled : bool
         Whether the largest |x| and |θ| are below 1e-3 of their largest over the whole run, or
-        below what the integration resolves.
+        below what the integration resolves, in a run of 2π and more.
     stick_fraction : float
         Share of the time in torsional stick.
     period : float or None
@@ -98,7 +101,7 @@ def summarise(simulation: Trace, resolved: float = 0.0) -> Summary:
         driven = simulation.on_steps(PER_STEP, names=inputs) if inputs else run
         # The run is in order of time; its tail starts with the step that holds `since`.
         tail = simulation.on_steps(PER_STEP, since, ("x", "theta", "dtheta", "delay", "contact"))
-    settled = simulation.steps > 0 and all(
+    settled = end >= SHORTEST and all(
         float(abs(getattr(tail, name)).max())
         <= max(SETTLED * float(abs(getattr(run, name)).max()), resolved)
         for name in ("x", "theta")

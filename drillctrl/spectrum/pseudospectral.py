@@ -48,6 +48,15 @@ def _chebyshev(degree: int) -> FloatArray:
     return matrix
 
 
+@functools.lru_cache(maxsize=64)
+def own_abscissa(degree: int) -> float:
+    """Return the abscissa, times τ, of the collocation of a delay that nothing enters.
+
+    It is near −2 for few nodes and −5 for many: what lies further left does not show.
+    """
+    return float(np.linalg.eigvals(_blocks(degree, 1)[0]).real.max())
+
+
 def degree_for(system: DelaySystem, right_of: float = 0.0) -> int:
     """Choose the degree that resolves all roots right of a line.
 

@@ -37,6 +37,8 @@ _Gathered = tuple[ComplexArray, BoolArray, float]
 # root that stands alone.
 _WIDE = 0.1
 _NARROW = 1e-3
+# How far, over what the starts have moved by, and how often others are taken along.
+_AS_FAR, _WIDER = 4.0, 4
 # Largest matrix of a collocation that is to resolve everything, and of one that is to
 # supply first places only.
 _LARGEST = 240
@@ -137,16 +139,29 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
             top = inside[int(np.argmax(inside.real))]
             near = int((np.abs(inside - top) < CLOSE * (1.0 + abs(top))).sum())
             slack = _NARROW if near == 1 and not 0.0 < top.imag < CLOSE else slack
-        start = inside[inside.real >= floor - slack * (1.0 + np.abs(inside))]
-        s, done = polish(system, start)
-        if slack == _NARROW and (np.abs(s - start) > _NARROW * (1.0 + np.abs(start))).any():
-            # A simple root starts far nearer than that: it has neighbours that pull.
-            start = inside[inside.real >= floor - _WIDE * (1.0 + np.abs(inside))]
+        left = slack * (1.0 + np.abs(inside))
+        for _ in range(_WIDER):
+            start = inside[inside.real >= floor - left]
             s, done = polish(system, start)
+            moved = np.abs(s - start)
+            wider = left
+            if (moved > _NARROW * (1.0 + np.abs(start))).any():
+                # A simple root starts far nearer than that: it has neighbours that pull.
+                wider = np.maximum(wider, _WIDE * (1.0 + np.abs(inside)))
+            # As far as one has come from the left another may still have to come.
+            far = moved[(start.real >= floor) | (s.real >= floor)].max(initial=0.0)
+            wider = np.maximum(wider, _AS_FAR * far)
+            if not ((inside.real >= floor - wider) & (inside.real < floor - left)).any():
+                break
+            left = wider
         strayed = np.abs(s - start) > 0.1 * (1.0 + np.abs(start))
         lost = ~done | strayed
+        wanted = floor
+        if line is None:
+            # Starts may lie right of their roots.
+            wanted = min(floor, float(s.real[~lost].max(initial=-np.inf)) - depth)
         # Far left of what is wanted the collocation may be rough.
-        if not (lost & ((start.real >= floor) | (s.real >= floor))).any():
+        if not (lost & ((start.real >= floor - _AS_FAR * far) | (s.real >= wanted))).any():
             s, done = s[~lost], done[~lost]
             order = np.argsort(-s.real, kind="stable")
             return s[order], done[order], floor

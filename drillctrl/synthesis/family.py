@@ -23,7 +23,12 @@ from drillctrl.spectrum.pseudospectral import (
     generator_matrix,
 )
 from drillctrl.spectrum.roots import spectral_abscissa
-from drillctrl.synthesis.boxes import bound_of_entries, largest_loop, natural_speed
+from drillctrl.synthesis.boxes import (
+    bound_of_entries,
+    counted_from,
+    largest_loop,
+    natural_speed,
+)
 from drillctrl.synthesis.expansion import Expansion, expand
 
 # Gains that need more make the loop far faster than its plant; their loops are looked at again.
@@ -81,6 +86,8 @@ class LoopFamily:
         Delay through which each entry acts.
     degree : int
         Of the collocation.
+    line : float
+        Real part near which it resolves the rightmost roots.
     """
 
     system: DelaySystem
@@ -94,6 +101,7 @@ class LoopFamily:
     seen: FloatArray
     lags: FloatArray
     degree: int
+    line: float = 0.0
 
     def loop(self, gains: FloatArray) -> DelaySystem:
         """Return the closed loop at a gain vector."""
@@ -252,7 +260,10 @@ class LoopFamily:
 
 
 def loop_family(
-    system: DelaySystem, feedback: FeedbackStructure, degree: int | None = None
+    system: DelaySystem,
+    feedback: FeedbackStructure,
+    degree: int | None = None,
+    line: float = 0.0,
 ) -> LoopFamily:
     """Assemble the family of closed loops.
 
@@ -264,6 +275,10 @@ def loop_family(
         Names inputs, outputs, bounds and ties.
     degree : int, optional
         Of the collocation; by default what the largest gains within the bounds need.
+    line : float
+        Real part near which rightmost roots are to be resolved: with s = line + z the delayed
+        terms grow by exp(−line τ), and a collocation shows no root further left than z of
+        some −2/τ.
     """
     drive, measure = loop_channels(system, feedback)
     spread = feedback.spread
@@ -295,14 +310,19 @@ def loop_family(
         else:
             carried[lag] = np.hstack([left, np.zeros((system.order, more))]), wide
     delays = tuple(sorted(carried))
+    signals = [carried[delay] for delay in delays]
     plain = replace(plain, delays=delays, delayed=tuple(map(plain.delayed_matrix, delays)))
     if degree is None:
         # Three more than suffices to start an iteration on the characteristic equation.
-        largest = largest_loop(system, feedback, bound_of_entries(feedback))
-        resolved = degree_for_reach(natural_speed(system, feedback) * largest.max_delay)
+        largest = largest_loop(system, feedback, bound_of_entries(feedback), line)
+        resolved = degree_for_reach(natural_speed(system, feedback, line) * largest.max_delay)
         degree = min(degree_for(largest), max(_FINEST, resolved)) + 3
-    base = generator_matrix(plain, degree, [carried[delay] for delay in delays])
+    shifted = replace(plain, A0=counted_from(plain, line)[0])
+    growth = [np.exp(-line * delay) for delay in delays]
+    factors = [(left * up, right) for (left, right), up in zip(signals, growth, strict=True)]
+    base = generator_matrix(shifted, degree, factors)
     size, n = base.shape[0], system.order
+    base += line * np.eye(size)
     # The oldest values of the signals of each delay.
     degrees = degrees_for(delays, degree)
     widths = [p * len(carried[delay][1]) for p, delay in zip(degrees, delays, strict=True)]
@@ -326,7 +346,7 @@ def loop_family(
             measurement[row, :n] = measure[output]
         else:
             weights = np.linalg.lstsq(right.T, measure[output], rcond=None)[0]
-            measurement[row, end - rank : end] = weights
+            measurement[row, end - rank : end] = weights * growth[place]
     return LoopFamily(
         system,
         feedback,
@@ -339,4 +359,5 @@ def loop_family(
         measure[source],
         lags,
         degree,
+        line,
     )

@@ -79,6 +79,7 @@ def solve(
         Value and gradient of what is added to the objective.
     """
     search = global_search(family, seed)
+    family = search.family or family
     plain = isinstance(objective, Exact) and cost is None
     # What the unconstrained optimum meets is no constraint.
     if plain and meets(family, search.best.gains, requirements):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.spectrum.pseudospectral import own_abscissa
 from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
@@ -22,6 +23,8 @@ _WIDTHS = (0.05, 0.2, 0.5)
 _DESCENTS = 4
 # Plants of so many states are looked at by a collocation of this degree before descents begin.
 _MANY_STATES, _COARSE = 40, 16
+# How often a collocation is drawn further left, and how far at most, over the longest delay.
+_DEEPER, _LEFTMOST = 6, -200.0
 
 
 @dataclass(frozen=True)
@@ -90,12 +93,15 @@ class Search:
         How many descents ended in the lowest basin.
     evaluations : int
         Eigenvalue problems and root conditions solved.
+    family : LoopFamily, optional
+        The loops, with a collocation that resolves the rightmost roots of the best.
     """
 
     best: Basin
     basins: tuple[Basin, ...]
     hits: int
     evaluations: int
+    family: LoopFamily | None = None
 
 
 def global_search(
@@ -123,11 +129,50 @@ def global_search(
         only = Basin(family.feedback.lower, value, ())
         return Search(only, (only,), 1, 1)
     effort = EFFORTS[min(count, 4)] if effort is None else effort
-    inner = nested_boxes(family.system, family.feedback)[:-1] if effort.begun else []
+    family = _near_what_is(family)
+    search = _in_boxes(family, seed, effort, known)
+    for _ in range(_DEEPER):
+        if not effort.begun or _resolves(family, search.best.value):
+            break
+        # What lies left of all that the collocation shows looked alike: once more, from there.
+        family = _near(family, search.best.value)
+        best = search.best
+        again = _in_boxes(family, seed, effort, [*known, best.gains])
+        used = search.evaluations + again.evaluations
+        search = replace(again if again.best.value <= best.value else search, evaluations=used)
+        if search.best.value > best.value - 1e-9 * (1.0 + abs(best.value)):
+            break
+    return replace(search, family=family)
+
+
+def _resolves(family: LoopFamily, alpha: float) -> bool:
+    """Whether a collocation shows a rightmost root as far left as that."""
+    longest = max([*family.plain.delays, *family.lags.tolist()], default=0.0)
+    return not longest or (alpha - family.line) * longest > 0.9 * own_abscissa(family.degree)
+
+
+def _near(family: LoopFamily, alpha: float) -> LoopFamily:
+    longest = max([*family.plain.delays, *family.lags.tolist()])
+    return loop_family(family.system, family.feedback, line=max(alpha, _LEFTMOST / longest))
+
+
+def _near_what_is(family: LoopFamily) -> LoopFamily:
+    """Return the family near the rightmost root of the loop of least gains, if that is far left."""
+    centre = np.clip(0.0, family.feedback.lower, family.feedback.upper)
+    if _resolves(family, family.value(centre)):
+        return family
+    alpha = family.exact(centre)
+    return family if _resolves(family, alpha) else _near(family, alpha)
+
+
+def _in_boxes(family: LoopFamily, seed: int, effort: Effort, known: Sequence[FloatArray]) -> Search:
+    """Search from the gains that matter beside the plant up to the bounds."""
+    inner = nested_boxes(family.system, family.feedback, family.line)[:-1] if effort.begun else []
     basins: list[Basin] = []
     evaluations = 0
     for feedback in inner:
-        found = _in_box(loop_family(family.system, feedback), seed, effort, known)
+        loops = loop_family(family.system, feedback, line=family.line)
+        found = _in_box(loops, seed, effort, known)
         end = found.best.gains
         if ((end <= feedback.lower) | (end >= feedback.upper)).any():
             known = [*known, end]
@@ -194,7 +239,9 @@ def starting_points(
     inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
     # Which are the best shows at a coarse collocation, too.
     many = family.system.order >= _MANY_STATES and family.degree > 2 * _COARSE
-    coarse = loop_family(family.system, family.feedback, _COARSE) if many else family
+    coarse = family
+    if many:
+        coarse = loop_family(family.system, family.feedback, _COARSE, family.line)
     values = coarse.abscissas(points)
     order = np.argsort(values, kind="stable")
     chosen = points[order[: effort.begun]]

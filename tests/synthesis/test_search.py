@@ -156,3 +156,7 @@ def test_boxes_widen_to_the_bounds(plant_c):
         assert (inner.upper <= outer.upper).all()
         assert (inner.lower < inner.upper).all()
     assert len(nested_boxes(plant_c, preset_structure("case2"))) == 1
+    # As narrow inside as within any bounds.
+    widest = nested_boxes(plant_c, preset_structure("p").with_bounds({"K1": (-1e12, 1e12)}))
+    wide = nested_boxes(plant_c, preset_structure("p").with_bounds({"K1": (-1e4, 1e4)}))
+    assert widest[0].lower == pytest.approx(wide[0].lower, rel=1e-6)
