@@ -18,6 +18,7 @@ from drillctrl import (
     Controller,
     Drilling,
     RigPoint,
+    Scenario,
     as_case,
     mode_at,
     preset_structure,
@@ -57,8 +58,8 @@ def measured_rate(case, controller, frequency, initial=None):
     """Return the growth rate of the bit's swing at a frequency, None where it shows none."""
     _, point = case.physics("a rate")
     initial = initial or {"dtheta": _SWING * point.omega0}
-    initial = {"dx": 0.1 * point.penetration_rate, **initial}
-    run = simulate(case, controller, duration=120.0, initial=initial, backwards="stop")
+    start = Scenario(initial=initial, kick=(0.1, 0.0), alone=True)
+    run = simulate(case, controller, duration=120.0, scenario=start, backwards="stop")
     length = _WINDOW * 2.0 * math.pi / frequency
     begins = np.arange(10.0, float(run.times[-1]) - length, 0.25 * length)
     if begins.size < 4:

@@ -167,7 +167,7 @@ def test_a_kick_moves_a_string_with_its_bit(name):
     """A bit alone gives its speed away at once; kicked with its string it swings back."""
     case = as_case(at(string_preset(name), 120.0, 10.0))
     structure = structure_of(case)
-    kick = structure.kicked(0.3, 0.5)
+    kick = structure.kicked(0.3 * structure.penetration_rate, 0.5 * structure.omega0)
     assert kick[[1, 3]] == pytest.approx([0.3 * structure.penetration_rate, 0.5 * structure.omega0])
     place = structure.state_names.index
     assert not kick[
@@ -178,10 +178,35 @@ def test_a_kick_moves_a_string_with_its_bit(name):
     swings = []
     for scenario in (
         Scenario(kick=(0.0, 0.5)),
-        Scenario(initial={"dtheta": 0.5 * structure.omega0}),
+        Scenario(initial={"dtheta": 0.5 * structure.omega0}, alone=True),
     ):
         run = simulate(case, duration=5.0, scenario=scenario, rtol=1e-5)
         later = run.at(np.linspace(1.0, 5.0, 200)).dtheta / structure.omega0
         swings.append(float(np.abs(later).max()))
     assert 0.25 < swings[0] < 0.5
     assert swings[1] < 0.02
+
+
+def test_a_speed_of_the_bit_is_a_kick_of_its_string():
+    """By name or as a share it is the same; filters and a hook stay as they are."""
+    where = at(string_preset("vertical-3000"), 120.0, 10.0)
+    case, _ = law_controller(where, transfer_control(where.rig.drive, ([1e3, 1e3], [1.0, 4.0])))
+    structure = structure_of(case)
+    feed, speed = 0.3 * structure.penetration_rate, 0.2 * structure.omega0
+    runs = [
+        simulate(case, duration=1e-3, scenario=scenario)
+        for scenario in (
+            Scenario(initial={"dx": feed, "dtheta": speed}),
+            Scenario(kick=(0.3, 0.2)),
+            Scenario(initial={"dx": feed}, kick=(0.0, 0.2)),
+        )
+    ]
+    states = [run.at([0.0], structure.state_names) for run in runs]
+    first, *others = [
+        np.array([getattr(state, n)[0] for n in structure.state_names]) for state in states
+    ]
+    for other in others:
+        np.testing.assert_allclose(other, first, atol=1e-9 * abs(first).max())
+    moves = {n for n, value in zip(structure.state_names, first, strict=True) if value}
+    assert {"dx", "dtheta", "dx1", "dtheta1"} < moves
+    assert all(name.startswith(("dx", "dtheta")) for name in moves)
