@@ -223,7 +223,7 @@ def kicked_states(
     free = {*moving, *map(names.index, follows)}
     kick = np.zeros(len(arrays.A))
     kick[[1, 3]] = axial, rotary
-    held = [i for i in range(BIT_STATES, len(names)) if i not in free]
+    held = [i for i in range(len(names)) if i not in free]
     for speeds in ((axial, 0.0), (0.0, rotary)):
         if follows and any(speeds):
             led = _led(arrays, *speeds, held)
@@ -245,7 +245,7 @@ def _led(
     n = arrays.A.shape[0]
     # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known: both powers of
     # t at once, since a state that integrates takes its rate from the other.
-    fixed = np.array([*range(4), *held])
+    fixed = np.union1d(range(BIT_STATES), held).astype(int)
     free = np.setdiff1d(np.arange(n), fixed)
     b, a = np.zeros(n), np.zeros(n)
     b[[0, 2]] = a[[1, 3]] = axial, rotary

@@ -14,6 +14,7 @@ from drillctrl.drilling.case import as_case
 from drillctrl.drilling.motion import stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
+from drillctrl.motion.response import turned_case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.run import simulate
@@ -210,3 +211,14 @@ def test_a_speed_of_the_bit_is_a_kick_of_its_string():
     moves = {n for n, value in zip(structure.state_names, first, strict=True) if value}
     assert {"dx", "dtheta", "dx1", "dtheta1"} < moves
     assert all(name.startswith(("dx", "dtheta")) for name in moves)
+
+
+def test_a_bit_whose_turning_is_imposed_takes_its_string_along_the_axis():
+    case = turned_case(at(string_preset("paper-string"), 120.0, 10.0), 3.0)
+    free = structure_of(as_case(at(string_preset("paper-string"), 120.0, 10.0)))
+    led, known = structure_of(case), free.kicked(1.0, 0.0)
+    kick = led.kicked(1.0, 0.5)
+    assert kick[3] == 0.5
+    for i, name in enumerate(led.state_names):
+        if name != "dtheta":
+            assert kick[i] == pytest.approx(known[free.state_names.index(name)], rel=1e-6)
