@@ -202,8 +202,8 @@ def design_drive(
         by how it shakes the string, measured in a minute or two; see `bit_load`.
     trials : bool
         At a point, whether laws are run from a small start and from kicks beside a stiff drive:
-        the one asked for and, beside an optimised one, ``"z-torque"`` by its rule and tuned. The
-        best of these is the answer.
+        the one asked for and, beside an optimised one, ``"z-torque"`` tuned and by its rule, and
+        ``"soft-torque"`` by its own. The best of these is the answer.
     workers : int
         Processes that share the runs.
     keep : str or Path, optional
@@ -232,8 +232,11 @@ def design_drive(
             raise InputError("objective", objective.name, wanted)
         bit = bit_load(where, objective, workers=workers, keep=keep)
     laws = [drive_control(structure, rig, length_error, bit)]
-    if trials and isinstance(where, RigPoint) and structure.startswith("dynamic-"):
-        laws += [drive_control(TUNED, rig, length_error, bit), drive_control("z-torque", rig)]
+    if trials and isinstance(where, RigPoint) and (bit or structure.startswith("dynamic-")):
+        laws += [drive_control(TUNED, rig, length_error, bit)] if structure != TUNED else []
+        for name in ("z-torque", "soft-torque"):
+            law = drive_control(name, rig)
+            laws += [replace(law, name=f"{name} by rule") if name == structure else law]
     found = compare_drives(rig, laws, falling)
     tried: tuple[DriveTrials, ...] = ()
     if trials and isinstance(where, RigPoint):
