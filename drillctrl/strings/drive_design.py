@@ -37,6 +37,9 @@ MODES = 4
 # the second share of the impedance of the lowest stretch, they keep the first share of that.
 _KEPT, _AIM = 0.2, 0.15
 _LATER = 1.5
+# What the string stands with a free bit, over what it does under the rules, where laws for a bit
+# reach that: stick-slip begins at a lower speed then.
+_ABOVE = 1.5
 # Samples up to the first mode, between modes, and of an echo from mode to mode.
 _PER_MODE, _BETWEEN, _TURN = 80.0, 40.0, 14.0
 _GROWTH = 1e-3
@@ -161,7 +164,7 @@ class _Swing(_Slopes):
     """The logarithm of the mean square of the bit's speed over all loops, and its gradient.
 
     Infinite where a mode grows with what the bit answers, or where without that the string as it
-    is stands less than those of some slopes that a known law reaches.
+    is stands less than the largest of some slopes, or half as much again, that a known law reaches.
     """
 
     def __init__(
@@ -169,7 +172,8 @@ class _Swing(_Slopes):
     ) -> None:
         super().__init__(family, loops)
         most = self.free_slope(known)
-        self.floor = max((slope for slope in slopes if slope <= most), default=0.0)
+        wanted = [more * slope for slope in slopes for more in (1.0, _ABOVE)]
+        self.floor = max((slope for slope in wanted if slope <= most), default=0.0)
 
     def value(self, numbers: FloatArray) -> tuple[float, int, int]:
         """Return minus the logarithm, and where the smallest slope is."""
@@ -301,8 +305,8 @@ def dynamic_drive_control(
     bit : BitLoad, optional
         What the bit does where it drills: slopes are then what its answer leaves of them, and of
         the laws under which none vanishes the law is that under which the bit is shaken least.
-        With a free bit the string stands no less than under soft torque and Z-torque by their
-        rules, where a law of that order reaches that.
+        With a free bit the string stands half as much again as under soft torque and Z-torque by
+        their rules, or as much, where a law of that order reaches that.
 
     Returns
     -------
