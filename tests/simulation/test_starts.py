@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from drillctrl.base.errors import InputError
 from drillctrl.cli import main
 from drillctrl.drilling.case import as_case
-from drillctrl.drilling.motion import stuck_states
+from drillctrl.drilling.motion import kicked_states, stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.motion.response import turned_case
@@ -222,3 +223,21 @@ def test_a_bit_whose_turning_is_imposed_takes_its_string_along_the_axis():
     for i, name in enumerate(led.state_names):
         if name != "dtheta":
             assert kick[i] == pytest.approx(known[free.state_names.index(name)], rel=1e-6)
+
+
+def test_a_string_that_cannot_follow_its_bit_is_not_kicked():
+    """Pushed by the bit and held by nothing it runs off, faster and faster."""
+    names = ("x", "dx", "theta", "dtheta", "x1", "dx1")
+    pushed = np.zeros((6, 6))
+    pushed[[0, 2, 4], [1, 3, 5]] = 1.0
+    pushed[5, 0] = 4.0
+    load = np.zeros((6, 2))
+    load[[1, 3], [0, 1]] = -1.0
+    arrays = SimpleNamespace(A=pushed, E=load)
+    with pytest.raises(InputError, match=r"kick = 0\.2: must be 0 where"):
+        kicked_states(arrays, names, 0.2, 0.0)
+    np.testing.assert_array_equal(kicked_states(arrays, names, 0.0, 0.3), [0, 0, 0, 0.3, 0, 0])
+    held = pushed.copy()
+    held[5, 4] = -4.0
+    arrays = SimpleNamespace(A=held, E=load)
+    np.testing.assert_allclose(kicked_states(arrays, names, 0.2, 0.0), [0, 0.2, 0, 0, 0, 0.2])
