@@ -233,10 +233,12 @@ def design_drive(
         bit = bit_load(where, objective, workers=workers, keep=keep)
     laws = [drive_control(structure, rig, length_error, bit)]
     if trials and isinstance(where, RigPoint) and (bit or structure.startswith("dynamic-")):
-        laws += [drive_control(TUNED, rig, length_error, bit)] if structure != TUNED else []
-        for name in ("z-torque", "soft-torque"):
-            law = drive_control(name, rig)
-            laws += [replace(law, name=f"{name} by rule") if name == structure else law]
+        rules = [drive_control(name, rig) for name in ("z-torque", "soft-torque")]
+        for law in (drive_control(TUNED, rig, length_error, bit), *rules):
+            # What tuning leaves as it is by its rule need not be run twice.
+            if all((law.speed, law.torque) != (known.speed, known.torque) for known in laws):
+                name = f"{law.name} by rule" if law.name == structure else law.name
+                laws.append(replace(law, name=name))
     found = compare_drives(rig, laws, falling)
     tried: tuple[DriveTrials, ...] = ()
     if trials and isinstance(where, RigPoint):
