@@ -18,6 +18,7 @@ from drillctrl import (
     Controller,
     Drilling,
     RigPoint,
+    Scenario,
     as_case,
     mode_at,
     preset_structure,
@@ -56,9 +57,12 @@ def begun_in(case, mode):
 def measured_rate(case, controller, frequency, initial=None):
     """Return the growth rate of the bit's swing at a frequency, None where it shows none."""
     _, point = case.physics("a rate")
+    # Off the rock a long string is on its orbit at once; out of smooth drilling that may take as
+    # long as a swing takes to die out as if there were no orbit.
+    kick = 0.1 if initial is None else -2.0
     initial = initial or {"dtheta": _SWING * point.omega0}
-    initial = {"dx": 0.1 * point.penetration_rate, **initial}
-    run = simulate(case, controller, duration=120.0, initial=initial, backwards="stop")
+    start = Scenario(initial=initial, kick=(kick, 0.0), alone=True)
+    run = simulate(case, controller, duration=120.0, scenario=start, backwards="stop")
     length = _WINDOW * 2.0 * math.pi / frequency
     begins = np.arange(10.0, float(run.times[-1]) - length, 0.25 * length)
     if begins.size < 4:

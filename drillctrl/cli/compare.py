@@ -38,7 +38,9 @@ ENDINGS = (".html", ".csv", ".json")
 )
 @click.option("--bound", multiple=True, metavar="GAIN=LOW:HIGH", help="As for design.")
 @click.option(
-    "--initial", help="Disturbance (default dx=1,dtheta=1); with a rig 'dx=1 m/h,dtheta=5 rpm'."
+    "--initial",
+    help="Disturbance of the bit, with which a string moves (default dx=1,dtheta=1); with a rig "
+    "'dx=1 m/h,dtheta=5 rpm'.",
 )
 @click.option("--duration", metavar="TIME", help="Of simulations (default 200); with a rig '60 s'.")
 @click.option("--sort", default="spectral_abscissa", show_default=True, help="Measure to sort by.")

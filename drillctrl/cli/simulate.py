@@ -62,8 +62,8 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--initial",
-    help="Perturbation at t = 0: x, dx, theta, dtheta (default dx=1,dtheta=1; none from rest); "
-    "with a rig 'dx=1 m/h,dtheta=5 rpm'.",
+    help="Perturbation at t = 0 of the bit: x, dx, theta, dtheta (default dx=1,dtheta=1; none from "
+    "rest); with a rig 'dx=1 m/h,dtheta=5 rpm'. A string moves with dx and dtheta.",
 )
 @click.option(
     "--change",

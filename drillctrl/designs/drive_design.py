@@ -214,8 +214,8 @@ def design_drive(
         by how it shakes the string, measured in a minute or two; see `bit_load`.
     trials : bool
         At a point, whether laws are run from a small start and from kicks beside a stiff drive:
-        the one asked for and, beside an optimised one, ``"z-torque"`` by its rule and tuned. The
-        best of these is the answer.
+        the one asked for and, beside an optimised one, ``"z-torque"`` tuned and by its rule, and
+        ``"soft-torque"`` by its own. The best of these is the answer.
     workers : int
         Processes that share the runs.
     keep : str or Path, optional
@@ -250,8 +250,13 @@ def design_drive(
         if box:
             raise InputError("box", f"{len(box)} errors", f"left out with {objective.name}")
     laws = [drive_control(structure, rig, length_error, bit, box)]
-    if trials and isinstance(where, RigPoint) and structure.startswith("dynamic-"):
-        laws += [drive_control(name, rig, box=box) for name in (TUNED, "z-torque")]
+    if trials and isinstance(where, RigPoint) and (bit or structure.startswith("dynamic-")):
+        rules = [drive_control(name, rig, box=box) for name in ("z-torque", "soft-torque")]
+        for law in (drive_control(TUNED, rig, length_error, bit, box), *rules):
+            # What tuning leaves as it is by its rule need not be run twice.
+            if all((law.speed, law.torque) != (known.speed, known.torque) for known in laws):
+                name = f"{law.name} by rule" if law.name == structure else law.name
+                laws.append(replace(law, name=name))
     found = compare_drives(rig, laws, falling)
     tried: tuple[DriveTrials, ...] = ()
     if trials and isinstance(where, RigPoint):

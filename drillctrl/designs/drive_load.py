@@ -101,7 +101,11 @@ def _measured(
     unit = rig.torsional_stiffness * rig.time_scale
     answers = [
         BitAnswer(
-            f, swing, complex(each.value * unit), float(each.error * unit), each.error < UNKNOWN
+            f,
+            swing,
+            complex(each.value * unit),
+            float(each.error * unit),
+            bool(each.error < UNKNOWN),
         )
         for (f, swing), each in zip(places[1:], found[1:], strict=True)
         if isinstance(each, BitResponse)

@@ -46,12 +46,15 @@ class Verdict:
         What was run; empty where nothing was.
     harm : bool
         Whether from some start the motion is worse than without control.
+    caution : str or None
+        In what it is worse where control need not be on: under way, or with a bit that stands.
     """
 
     recommended: bool | None
     reason: str
     trials: tuple[Trial, ...] = ()
     harm: bool = False
+    caution: str | None = None
 
     @property
     def refused(self) -> bool:
@@ -71,6 +74,7 @@ def try_gains(
     *,
     uncontrolled: dict[str, Figures] | None = None,
     spare: bool = False,
+    standing: bool = True,
     surroundings: Mapping[str, Any] | None = None,
 ) -> Verdict:
     """Try gains on the nonlinear motion, and judge them.
@@ -85,6 +89,8 @@ def try_gains(
         Whether the linear loop is.
     uncontrolled, spare
         As in `trial_runs`.
+    standing : bool
+        Whether gains that are recommended are tried on a bit that stands at first, too.
     surroundings : mapping, optional
         Attributes of the `Controller` that closes the loop: limits, clock, delays.
     """
@@ -100,10 +106,11 @@ def try_gains(
         return Verdict(None, f"{LEFT_OUT}: the simulator cannot close this loop ({error})")
     trials = trial_runs(case, controller, uncontrolled=uncontrolled, spare=spare)
     verdict = judge(trials, stable)
-    if spare or not verdict.recommended:
+    if not (standing and verdict.recommended):
         return verdict
-    standing = trial_runs(case, controller, uncontrolled=uncontrolled, starts=standing_starts(case))
-    return with_engagement(verdict, standing, "switch them on once the bit turns")
+    starts = standing_starts(case)
+    runs = trial_runs(case, controller, uncontrolled=uncontrolled, spare=spare, starts=starts)
+    return with_engagement(verdict, runs, "switch them on once the bit turns")
 
 
 def judge(
@@ -172,7 +179,7 @@ def with_engagement(
     if worse is None or not verdict.recommended:
         return replace(verdict, trials=trials)
     reason = f"{verdict.reason}; but {advice}: {worse}"
-    return replace(verdict, reason=reason, trials=trials)
+    return replace(verdict, reason=reason, trials=trials, caution=worse)
 
 
 def _but(runs: Sequence[Trial]) -> str:

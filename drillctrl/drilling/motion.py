@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
+import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError
@@ -24,7 +24,8 @@ from drillctrl.drilling.coefficients import Coefficients
 from drillctrl.drilling.linear import BIT_STATES, linear_depth, linearisation
 from drillctrl.drilling.plant import Evaluator, Plant, by_form, evaluator, expressions
 
-logger = logging.getLogger("drillctrl")
+# Top ends that a kick of the bit leaves as they are; those of a user follow.
+_TOPS = ("phi", "hook")
 BIT_COEFFICIENTS = ("rotary_speed", "penetration_rate", "blades")
 
 
@@ -190,7 +191,10 @@ def stuck_states(arrays: MotionArrays, time: float) -> tuple[FloatArray, FloatAr
         If such a motion does not exist.
     """
     c = Coefficients(*arrays.q[: len(Coefficients._fields)])
-    a, b = _led(arrays, -c.penetration_rate, -c.rotary_speed)
+    led = _led(arrays, -c.penetration_rate, -c.rotary_speed)
+    if led is None:
+        raise InputError("start", "stick", "steady where the string has no such motion")
+    a, b = led
     return a, a + time * b
 
 
@@ -200,8 +204,8 @@ def kicked_states(
     """Return by how much all of a string moves faster whose bit is kicked, (n,).
 
     A bit alone has next to no inertia of a long string: what it is given is gone at once. So the
-    string moves with it as if the bit were led slowly, and its top end goes on as it did. Where a
-    string has no such motion the bit alone is kicked, and a warning is logged.
+    string moves with it as if the bit were led slowly. Its top end goes on as it did, and so does
+    what is no motion of the string: filters and integrals.
 
     Parameters
     ----------
@@ -209,35 +213,41 @@ def kicked_states(
         Of the states.
     axial, rotary : float
         What the bit moves faster by.
+
+    Raises
+    ------
+    InputError
+        If the string has no such motion, as none without a source of energy.
     """
-    moving = [names.index(f"d{name}") for name in names if f"d{name}" in names]
-    held = [names.index(name) for name in ("phi", "dphi") if name in names]
+    ends = ("x", "theta", *_TOPS)
+    follows = [name for name in names if f"d{name}" in names and name not in ends]
+    moving = [names.index(f"d{name}") for name in follows]
+    free = {*moving, *map(names.index, follows)}
     kick = np.zeros(len(arrays.A))
-    for own, speeds in ((1, (axial, 0.0)), (3, (0.0, rotary))):
-        if speeds == (0.0, 0.0):
-            continue
-        try:
-            led, _ = _led(arrays, *speeds, held=held)
-        except InputError:
-            logger.warning("the string cannot follow its bit slowly: the bit alone is kicked")
-            led = np.zeros_like(kick)
-            led[own] = sum(speeds)
-        felt = np.abs(led) > 1e-9 * np.abs(led[moving]).max()
-        kick[moving] += np.where(felt, led, 0.0)[moving]
+    kick[[1, 3]] = axial, rotary
+    held = [i for i in range(len(names)) if i not in free]
+    for speeds in ((axial, 0.0), (0.0, rotary)):
+        if follows and any(speeds):
+            led = _led(arrays, *speeds, held)
+            if led is None:
+                wanted = "0 where the string cannot follow its bit, or of a scenario `alone`"
+                raise InputError("kick", max(speeds, key=abs), wanted)
+            felt = np.abs(led[0]) > 1e-9 * np.abs(led[0][[1, 3, *moving]]).max()
+            kick[moving] += np.where(felt, led[0], 0.0)[moving]
     return kick
 
 
 def _led(
     arrays: MotionArrays, axial: float, rotary: float, held: Sequence[int] = ()
-) -> tuple[FloatArray, FloatArray]:
-    """Return a and b of X = a + b t where the bit is led at constant speeds.
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return a and b of X = a + b t where the bit is led at constant speeds; None without such.
 
     The states ``held`` stay as they are, whatever that takes.
     """
     n = arrays.A.shape[0]
     # X = a + b t obeys b = A (a + b t) + E (f + g t) with the bit's own rates known: both powers of
     # t at once, since a state that integrates takes its rate from the other.
-    fixed = np.array([*range(4), *held])
+    fixed = np.union1d(range(BIT_STATES), held).astype(int)
     free = np.setdiff1d(np.arange(n), fixed)
     b, a = np.zeros(n), np.zeros(n)
     b[[0, 2]] = a[[1, 3]] = axial, rotary
@@ -246,9 +256,9 @@ def _led(
     own = np.hstack([np.eye(n)[:, free], np.zeros_like(forces)])
     unknown = np.block([[loaded, np.zeros_like(loaded)], [-own, loaded]])
     wanted = -np.concatenate([arrays.A[:, fixed] @ b[fixed], arrays.A[:, fixed] @ a[fixed] - b])
-    found, *_ = np.linalg.lstsq(unknown, wanted, rcond=None)
+    found, *_ = scipy.linalg.lstsq(unknown, wanted, lapack_driver="gelsy")
     if not np.allclose(unknown @ found, wanted, rtol=0.0, atol=1e-8 * abs(wanted).max()):
-        raise InputError("start", "stick", "steady where the string has no such motion")
+        return None
     rates, places = np.split(found, 2)
     b[free], a[free] = rates[: free.size], places[: free.size]
     return a, b

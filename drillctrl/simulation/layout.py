@@ -306,7 +306,11 @@ def begin(
 def _added(structure: Structure, scenario: Scenario) -> FloatArray:
     """Return what is added to the states at t = 0, (n,)."""
     added = scenario.perturbation(structure.state_names)
-    return added + structure.kicked(*scenario.kick) if any(scenario.kick) else added
+    speeds = np.array(scenario.kick) * (structure.penetration_rate, structure.omega0)
+    if not scenario.alone:
+        speeds += added[[1, 3]]
+        added[[1, 3]] = 0.0
+    return added + structure.kicked(*speeds.tolist())
 
 
 def _blank(structure: Structure, settings: data.Settings, room: int) -> March:

@@ -209,8 +209,8 @@ def simulate(
     duration : float
         Dimensionless time to simulate.
     initial : mapping, optional
-        Perturbation of steady drilling by state name, x, dx, theta, dtheta; short for a
-        `Scenario` that has only this.
+        Perturbation of steady drilling by state name, x, dx, theta, dtheta, a string moving with
+        its bit; short for a `Scenario` that has only this.
     scenario : Scenario, optional
         Start, perturbation and changes on the way.
     model : {"nonlinear", "linear"}

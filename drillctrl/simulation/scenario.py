@@ -68,13 +68,15 @@ class Scenario:
         end went on, and is let go at t = 0; or what another run left behind
         (`Simulation.past`).
     initial : mapping
-        Perturbation by state name (x, dx, theta, dtheta of the bit) that is added at t = 0.
-        The bit of a long string has next to no inertia of its own; see ``kick``.
+        Perturbation by state name (x, dx, theta, dtheta of the bit) that is added at t = 0. Where
+        the bit moves faster, by dx or dtheta, its string moves with it, as if the bit were led
+        slowly, its top end unmoved: the bit alone has next to no inertia of a long string.
     changes : tuple of Change
         In order of time, none starting before the one before it is complete.
     kick : (float, float)
-        By which shares of V0 and Ω0 the bit moves faster at t = 0, beside ``initial``, and with
-        it the string: as if the bit were led slowly, its top end unmoved.
+        By which shares of V0 and Ω0 the bit moves faster at t = 0, beside ``initial``.
+    alone : bool
+        Whether the states of ``initial`` are what moves, and no string with its bit.
 
     Raises
     ------
@@ -86,6 +88,7 @@ class Scenario:
     initial: Mapping[str, float] = field(default_factory=dict)
     changes: tuple[Change, ...] = ()
     kick: tuple[float, float] = (0.0, 0.0)
+    alone: bool = False
 
     def __post_init__(self) -> None:
         for share in self.kick:

@@ -87,6 +87,8 @@ def slow_down(
 ) -> Slowing:
     """Simulate a bit whose torque falls with its speed, while the driller slows down or speeds up.
 
+    The run begins with a kick of the string by a tenth of the first speed; see `Scenario`.
+
     Parameters
     ----------
     where : RigPoint
@@ -125,12 +127,11 @@ def slow_down(
         Change(hold * (i + 1) / time, _RAMP / time, omega0=speed * time)
         for i, speed in enumerate(given[1:].tolist())
     )
-    kick = {"dtheta": _KICK * float(given[0]) * time}
     run = simulate(
         case,
         controller,
         duration=hold * given.size / time,
-        scenario=Scenario("steady", kick, changes),
+        scenario=Scenario(changes=changes, kick=(0.0, _KICK)),
         rtol=1e-6,
         max_steps=_MOST_STEPS,
         time_limit=time_limit,

@@ -91,9 +91,8 @@ class Structure:
         """States of a string whose bit stands still: at first, and so long after, (n,) each."""
         return stuck_states(self.arrays, time)
 
-    def kicked(self, feed: float, speed: float) -> FloatArray:
-        """What a kick of the bit by these shares of V0 and Ω0 adds to the states, (n,)."""
-        axial, rotary = feed * self.penetration_rate, speed * self.omega0
+    def kicked(self, axial: float, rotary: float) -> FloatArray:
+        """What a bit that moves faster by so much adds to the states, its string with it, (n,)."""
         return kicked_states(self.arrays, self.state_names, axial, rotary)
 
 

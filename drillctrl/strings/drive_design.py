@@ -8,11 +8,12 @@ part of roots is, and BFGS descends it as it does that.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import checked_integer, checked_number
@@ -20,7 +21,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.bit_load import BitLoad
 from drillctrl.strings.drive_control import DriveControl, DriveMachine
 from drillctrl.strings.drive_family import DriveSignals, LawFamily, drive_signals
-from drillctrl.strings.drive_rules import soft_torque_control
+from drillctrl.strings.drive_rules import soft_torque_control, z_torque_control
 from drillctrl.strings.line import Line
 from drillctrl.strings.slopes import (
     HIGHEST,
@@ -36,6 +37,9 @@ MODES = 4
 # the second share of the impedance of the lowest stretch, they keep the first share of that.
 _KEPT, _AIM = 0.2, 0.15
 _LATER = 1.5
+# What the string stands with a free bit, over what it does under the rules, where laws for a bit
+# reach that: stick-slip begins at a lower speed then.
+_ABOVE = 1.5
 # Samples up to the first mode, between modes, and of an echo from mode to mode.
 _PER_MODE, _BETWEEN, _TURN = 80.0, 40.0, 14.0
 _GROWTH = 1e-3
@@ -100,14 +104,10 @@ class _Slopes:
             if self._grows(numbers, loop):
                 return -np.inf, i, 0
             z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
-            up = np.nonzero((z.imag[:-1] < 0.0) & (z.imag[1:] >= 0.0))[0]
-            if not up.size:
-                continue
-            share = -z.imag[up] / (z.imag[up + 1] - z.imag[up])
-            slopes = z.real[up] + share * (z.real[up + 1] - z.real[up])
+            up, slopes = _crossings(z)
             counted = slopes * loop.weights[up]
-            least = int(np.argmin(counted))
-            if counted[least] < best[0]:
+            if counted.size and counted.min() < best[0]:
+                least = int(np.argmin(counted))
                 best = float(counted[least]), i, int(up[least])
         return best
 
@@ -163,13 +163,29 @@ class _Slopes:
 class _Swing(_Slopes):
     """The logarithm of the mean square of the bit's speed over all loops, and its gradient.
 
-    Infinite where a mode grows with what the bit answers.
+    Infinite where a mode grows with what the bit answers, or where without that the string as it
+    is stands less than the largest of some slopes, or half as much again, that a known law reaches.
     """
+
+    def __init__(
+        self, family: LawFamily, loops: list[_Loop], slopes: Iterable[float], known: FloatArray
+    ) -> None:
+        super().__init__(family, loops)
+        most = self.free_slope(known)
+        wanted = [more * slope for slope in slopes for more in (1.0, _ABOVE)]
+        self.floor = max((slope for slope in wanted if slope <= most), default=0.0)
 
     def value(self, numbers: FloatArray) -> tuple[float, int, int]:
         """Return minus the logarithm, and where the smallest slope is."""
         slope, i, at = super().value(numbers)
-        return -self._mean_square(numbers) if slope > 0.0 else -np.inf, i, at
+        good = slope > 0.0 and self.free_slope(numbers) >= self.floor
+        return -self._mean_square(numbers) if good else -np.inf, i, at
+
+    def free_slope(self, numbers: FloatArray) -> float:
+        """Return the smallest slope of the first modes of the string as it is, its bit free."""
+        loop = self.loops[0]
+        up, slopes = _crossings(self._impedance(numbers, loop.s, loop.matrix, loop.drive))
+        return float(slopes[loop.weights[up] == 1.0].min(initial=np.inf))
 
     def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
         """Return the value to minimise and its gradient."""
@@ -186,6 +202,13 @@ class _Swing(_Slopes):
             z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
             found += float((loop.force / np.abs(z) ** 2).sum())
         return math.log(found / len(self.loops))
+
+
+def _crossings(z: ComplexArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Return the samples before which Im Z rises through zero, and Re Z there."""
+    up = np.nonzero((z.imag[:-1] < 0.0) & (z.imag[1:] >= 0.0))[0]
+    share = -z.imag[up] / (z.imag[up + 1] - z.imag[up])
+    return up, z.real[up] + share * (z.real[up + 1] - z.real[up])
 
 
 def _turns(values: ComplexArray) -> bool:
@@ -283,6 +306,8 @@ def dynamic_drive_control(
     bit : BitLoad, optional
         What the bit does where it drills: slopes are then what its answer leaves of them, and of
         the laws under which none vanishes the law is that under which the bit is shaken least.
+        With a free bit the string stands half as much again as under soft torque and Z-torque by
+        their rules, or as much, where a law of that order reaches that.
 
     others : sequence of Line
         Strings that the design holds for instead of shorter and longer ones.
@@ -309,14 +334,18 @@ def dynamic_drive_control(
     for grown in range(n % 2, n + 1, 2):
         family = LawFamily(grown, line.wave_impedance, rate, machine)
         known = _best(family, _Slopes(family, loops), known)[None, :]
-    if bit is not None and np.isfinite((goal := _Swing(family, loops)).value(known[0])[0]):
-        known = _best(family, goal, known)[None, :]
-    found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
     soft = soft_torque_control(machine, line.wave_impedance, float(modes[0]))
 
     def stands(law: DriveControl) -> float:
         return min(mode.slope for mode in mode_slopes(line, law, MODES))
 
+    if bit is not None:
+        rules = soft, z_torque_control(machine, line.wave_impedance)
+        slopes = [stands(law) for law in rules if drive_is_stable(line, law)]
+        goal = _Swing(family, loops, slopes, known[0])
+        if np.isfinite(goal.value(known[0])[0]):
+            known = _best(family, goal, known)[None, :]
+    found = DriveControl(f"dynamic-{n}", machine, *family.laws(known[0]))
     # What stands less than soft torque was found for the sake of the longer and shorter strings,
     # or of the torque of the bit.
     enough = bit is not None or stands(found) >= stands(soft) or not drive_is_stable(line, soft)

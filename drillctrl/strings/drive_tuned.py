@@ -21,8 +21,7 @@ from drillctrl.strings.slopes import (
 
 TUNED = "z-torque-tuned"
 # Wanted impedance over ζ: the pipe's own returns nothing, the rule's four times 0.6 of a wave.
-_LEAST, _MOST, _LOOKED = 1.0, 6.0, 9
-_RULE = 4.0
+_LEAST, _RULE, _MOST, _LOOKED = 1.0, 4.0, 6.0, 9
 # Of the largest weakest slope, what the chosen one keeps.
 _KEPT = 0.9
 _MODES = 4
@@ -65,6 +64,9 @@ def tuned_on_load(
 ) -> DriveControl:
     """Return the law under which the bit is shaken least where it drills.
 
+    Of those whose first modes stand no less, with a free bit, than under the rule's four times
+    the pipe's impedance.
+
     Parameters
     ----------
     line : Line
@@ -80,6 +82,11 @@ def tuned_on_load(
         If string and drive are unstable under all of these.
     """
     laws = _stable_laws(line, law_at)
+    stands = [min(mode.slope for mode in mode_slopes(line, law, _MODES)) for law in laws]
+    rule = law_at(_RULE)
+    if drive_is_stable(line, rule):
+        floor = min(mode.slope for mode in mode_slopes(line, rule, _MODES))
+        laws = [law for law, own in zip(laws, stands, strict=True) if own >= floor] + [rule]
     left = [min(bit.damping_left(mode) for mode in mode_slopes(line, law, _MODES)) for law in laws]
     if max(left) <= 0.0:
         return laws[int(np.argmax(left))]

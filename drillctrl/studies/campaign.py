@@ -217,7 +217,7 @@ def campaign(
     controller : Controller or GainTable, optional
         One controller everywhere, or the gains of a table at each point; without it no control.
     disturbance : mapping
-        Perturbation of steady drilling by state name, of size 1.
+        Perturbation of steady drilling by state name, of size 1, as ``initial`` of `Scenario`.
     sizes : sequence of float
         Rising multiples of it that are tried everywhere.
     largest : float

@@ -128,8 +128,8 @@ def compare(
     bounds : mapping, optional
         As in `design`, for the structures that have such gains.
     disturbance : mapping, optional
-        Perturbation of steady drilling at t = 0 by state name; by default that of the
-        paper's Fig. 13, ``{"dx": 1, "dtheta": 1}``.
+        Perturbation of steady drilling at t = 0 by state name, as ``initial`` of `Scenario`; by
+        default that of the paper's Fig. 13, ``{"dx": 1, "dtheta": 1}``.
     duration : float
         Dimensionless time of the simulations.
     region : pair of (name, low, high), optional

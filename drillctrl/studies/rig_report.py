@@ -39,7 +39,7 @@ from drillctrl.studies.vibration import VibrationMap, vibration_map
 _PERIODS, _PERIODS_OF_STRING, _MOST_SECONDS = 30.0, 3.0, 20.0
 _SAMPLES = 1500
 _RTOL = 1e-6
-# A kick of the bit alone tells little of a string, which a long stick winds up.
+# A long stick winds all of a string up.
 _START, _START_OF_STRING = "kick", "stick"
 # Of the map: points across and up, and its range over the point.
 _COUNTS, _ACROSS, _UP = (7, 5), (0.5, 1.5), (0.25, 2.0)

@@ -89,6 +89,7 @@ def to_document(table: GainTable) -> Document:
         "objective": table.objective,
         "tried": table.tried,
         "refused": {str(node): reason for node, reason in sorted(table.refusals.items())},
+        "cautions": {str(node): what for node, what in sorted(table.cautions.items())},
         "cells": {
             "modes": list(CELL_NAMES),
             "mode": table.cells.mode.tolist(),
@@ -207,7 +208,9 @@ def from_document(document: Document, plant: Plant) -> GainTable:
         _read_cells(header["cells"], math.prod(cell_shape(grid)), structure),
         _words("objective", header["objective"]),
         bool(header["tried"]),
-        _read_refusals(header["refused"], rows),
+        _read_reasons(header["refused"], rows),
+        # Older files have none.
+        _read_reasons(header.get("cautions", {}), rows),
     )
     _check_consistency(table, document)
     return table
@@ -219,10 +222,10 @@ def _words(name: str, value: Any) -> str:
     return value
 
 
-def _read_refusals(given: dict[str, Any], rows: int) -> dict[int, str]:
+def _read_reasons(given: dict[str, Any], rows: int) -> dict[int, str]:
     found = {int(node): _words("a reason", reason) for node, reason in given.items()}
     if not all(0 <= node < rows for node in found):
-        raise ValueError("a refusal at a node that is not there")
+        raise ValueError("a reason at a node that is not there")
     return found
 
 

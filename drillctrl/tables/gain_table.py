@@ -64,6 +64,9 @@ class GainTable:
     refusals : mapping of int to str
         For nodes whose gains the trials refused, why. No control stands there instead, and
         the table vouches for no cell beside them.
+    cautions : mapping of int to str
+        For nodes whose gains do worse than no control with a bit that stands at first, from rest
+        or out of a stick, in what: control is to be switched on once the bit turns.
     """
 
     grid: Grid
@@ -81,6 +84,7 @@ class GainTable:
     objective: str = repr(EXACT)
     tried: bool = False
     refusals: Mapping[int, str] = field(default_factory=dict)
+    cautions: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def on_motion(self) -> bool:
@@ -158,6 +162,7 @@ class GainTable:
             "fallback": self.fallback,
             "tried": self.tried,
             "refused_nodes": len(self.refusals),
+            "cautioned_nodes": len(self.cautions),
             "give_up": self.give_up,
             "largest_jump": jump,
             "largest_jump_between": None
@@ -168,7 +173,11 @@ class GainTable:
             },
             "worst_abscissa": self.worst_abscissa,
             "rows": [
-                {**dict(zip(self.columns, row, strict=True)), "reason": self.refusals.get(i)}
+                {
+                    **dict(zip(self.columns, row, strict=True)),
+                    "reason": self.refusals.get(i),
+                    "caution": self.cautions.get(i),
+                }
                 for i, row in enumerate(self.rows())
             ],
         }
@@ -267,17 +276,27 @@ class GainTable:
         """Say what trial runs showed, and why gains were refused."""
         if not self.tried:
             return ["                gains not tried on the nonlinear motion"]
-        if not self.refusals:
-            return ["                no gains refused by trial runs on the nonlinear motion"]
         word = "not recommended" if self.on_motion else "REFUSED"
-        lines = [f"                {len(self.refusals)} {word} by trial runs: control off"]
-        for node, reason in list(self.refusals.items())[:_SHOWN]:
+        lines = self._told(f"{word} by trial runs: control off", self.refusals, language)
+        lines = lines or ["                no gains refused by trial runs on the nonlinear motion"]
+        # One is enough: they say the same of much of a table.
+        text = "to be switched on once the bit turns, such as"
+        return lines + self._told(text, self.cautions, language, 1)
+
+    def _told(
+        self, what: str, reasons: Mapping[int, str], language: Language, most: int = _SHOWN
+    ) -> list[str]:
+        """Return how many nodes, and the first reasons with their places; nothing without any."""
+        if not reasons:
+            return []
+        lines = [f"                {len(reasons)} {what}"]
+        for node, reason in list(reasons.items())[:most]:
             place = zip(self.grid.axes, self.grid.coordinates[node].tolist(), strict=True)
             where = ", ".join(
                 a.text(value, language=language) for a, value in place if len(a.values) > 1
             )
             lines.append(f"                  {where or 'here'}: {reason}")
-        hidden = len(self.refusals) - _SHOWN
+        hidden = len(reasons) - most
         return [*lines, f"                  and {hidden} more"] if hidden > 0 else lines
 
     def plot(self, units: str | None = None) -> Figure:

@@ -182,7 +182,8 @@ def _design_otherwise(task: NodeTask) -> NodeDesign:
 class NodeCheck:
     """Independent answer on the loop at a node: roots, their count, and trial runs.
 
-    Where ``refusal`` says why trial runs refused the gains, the rest is of no control.
+    Where ``refusal`` says why trial runs refused the gains, the rest is of no control. ``caution``
+    is that of their `Verdict`.
     """
 
     index: int
@@ -191,6 +192,7 @@ class NodeCheck:
     stable: bool
     certified: bool
     refusal: str | None = None
+    caution: str | None = None
 
 
 def check_node(task: NodeTask) -> NodeCheck:
@@ -199,7 +201,7 @@ def check_node(task: NodeTask) -> NodeCheck:
     family = loop_family(task.case.system(structure.inputs), structure)
     loop = analyze_loop(family.loop(gains))
     off = no_control(structure)
-    refusal = None
+    refusal = caution = None
     if task.trials and (gains != off).any():
         verdict = try_gains(
             task.case,
@@ -209,6 +211,7 @@ def check_node(task: NodeTask) -> NodeCheck:
             spare=True,
             surroundings=task.surroundings,
         )
+        caution = verdict.caution
         if verdict.refused:
             refusal, loop = verdict.reason, analyze_loop(family.loop(off))
     return NodeCheck(
@@ -219,6 +222,7 @@ def check_node(task: NodeTask) -> NodeCheck:
         loop.stable,
         loop.certificate.agrees,
         refusal,
+        caution,
     )
 
 

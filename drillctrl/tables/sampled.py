@@ -132,7 +132,9 @@ def trial_words(table: GainTable) -> str:
         return "NONE: these gains have not been tried on the nonlinear motion"
     refused = len(table.refusals)
     text = f"gains of all {len(table.gains)} nodes tried on the nonlinear motion"
-    return f"{text}; {refused} refused, control is off there" if refused else text
+    text = f"{text}; {refused} refused, control is off there" if refused else text
+    late = len(table.cautions)
+    return f"{text}; switch on once the bit turns, for {late} do harm before" if late else text
 
 
 def care_words(settings: Settings, unit: str) -> tuple[str, ...]:

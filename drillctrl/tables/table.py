@@ -182,6 +182,7 @@ def table(
             repr(objective),
             bool(trials),
             refusals,
+            {each.index: each.caution for each in checks if each.caution},
         )
         finer = refined_grid(grid, cells, sound)
         if finer == grid:

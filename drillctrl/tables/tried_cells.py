@@ -51,8 +51,9 @@ def try_cells(task: CellTask) -> tuple[IntArray, Cells]:
         passed = bool(task.stable[corners].all())
         if passed:
             verdict = try_gains(
-                case, structure, K1, K2, False, spare=True, surroundings=task.surroundings
-            )
+                case, structure, K1, K2, False,
+                spare=True, standing=False, surroundings=task.surroundings,
+            )  # fmt: skip
             passed = not verdict.harm and not any(map(_fails, verdict.trials))
             passed = passed and crosses(task, cell)
         mode.append(INTERPOLATED if passed else UNSAFE)

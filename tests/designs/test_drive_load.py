@@ -83,7 +83,13 @@ def test_the_answer_is_the_least_that_any_swing_may_have():
 
 def test_a_law_for_the_bit_lets_it_swing_less_than_one_for_the_string(laws):
     string, bit = (load().forced_swing(LINE, law) for law in laws)
-    assert bit < 0.95 * string
+    assert bit < string
+    # Less swing is not bought by standing less than the rules do.
+    slopes = [
+        min(mode.slope for mode in mode_slopes(LINE, law, 4))
+        for law in (laws[1], drive_control("soft-torque", RIG))
+    ]
+    assert slopes[0] >= 0.999 * slopes[1]
     assert min(load().damping_left(mode) for mode in mode_slopes(LINE, laws[1])) > 0.0
     soft = drive_control("soft-torque", RIG, bit=load())
     first = drive_control("soft-torque", RIG).speed.numerator[1] / RIG.drive.inertia
@@ -99,7 +105,7 @@ def test_what_is_measured_comes_in_units_of_the_rig_and_is_kept(monkeypatch, tmp
 
     def response(case, frequency, amplitude, **options):
         asked.append((frequency / (2 * np.pi * RIG.time_scale), amplitude))
-        return SimpleNamespace(value=-0.01 + 0.02j, error=0.005)
+        return SimpleNamespace(value=-0.01 + 0.02j, error=np.float64(0.005))
 
     orbit = SimpleNamespace(broken=None, spacing=0.1, torque_samples=np.array([1.0, -1.0]))
     monkeypatch.setattr(drive_load, "BitResponse", SimpleNamespace)

@@ -107,7 +107,7 @@ def test_the_best_is_tried_out_of_a_stick_and_what_turns_back_no_further(drives,
 @pytest.mark.long
 def test_the_answer_of_a_dynamic_design_is_the_best_that_was_tried(monkeypatch):
     """Runs are made up here: the tuned Z-torque swings least, the dynamic law turns back."""
-    swings = {"dynamic-0": 0.5, "z-torque-tuned": 0.1, "z-torque": 0.2}
+    swings = {"dynamic-0": 0.5, "z-torque-tuned": 0.1, "z-torque": 0.2, "soft-torque": 0.3}
 
     def runs(where, measured, workers):
         assert [drive.control.name for drive in measured] == list(swings)
@@ -120,9 +120,9 @@ def test_the_answer_of_a_dynamic_design_is_the_best_that_was_tried(monkeypatch):
     assert fields["asked"] == "dynamic-0"
     assert fields["recommended"] is True
     assert [each["structure"] for each in fields["trials"]] == [
-        "z-torque-tuned", "dynamic-0", "z-torque",
+        "z-torque-tuned", "dynamic-0", "z-torque", "soft-torque",
     ]  # fmt: skip
-    assert [each["recommended"] for each in fields["trials"]] == [True, False, True]
+    assert [each["recommended"] for each in fields["trials"]] == [True, False, True, True]
     assert "In trial runs it did better than dynamic-0." in " ".join(found.summary().split())
     swings = dict.fromkeys(swings, 0.6)
     found = drive_design.design_drive(WHERE, "dynamic-0", trials=True)

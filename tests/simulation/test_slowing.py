@@ -133,8 +133,8 @@ def test_above_the_linear_threshold_nothing_grows(slowed):
 
 
 def test_a_bit_that_stands_does_not_turn_smoothly():
-    """Its drive has the torque that drilling takes, not that to free it again."""
-    weak = rig(DriveMachine(2900.0, torque_limit=1500.0, delay=0.02), length=1000.0)
+    """Its drive has the torque that drilling takes, and lacks torque and swing to free it again."""
+    weak = rig(DriveMachine(1000.0, torque_limit=1500.0, delay=0.02), length=1000.0)
     found = slow_down(
         RigPoint(weak, 45.0 * RPM, 1e-4 / 3600), drive_control("stiff", weak),
         [45.0 * RPM, 10.0 * RPM], falling=FallingTorque(6000.0, 2.0), hold=30.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ import pytest
 from drillctrl.base.errors import InputError
 from drillctrl.cli import main
 from drillctrl.drilling.case import as_case
-from drillctrl.drilling.motion import stuck_states
+from drillctrl.drilling.motion import kicked_states, stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
+from drillctrl.motion.response import turned_case
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.drive_control import law_controller
 from drillctrl.simulation.run import simulate
@@ -167,7 +169,7 @@ def test_a_kick_moves_a_string_with_its_bit(name):
     """A bit alone gives its speed away at once; kicked with its string it swings back."""
     case = as_case(at(string_preset(name), 120.0, 10.0))
     structure = structure_of(case)
-    kick = structure.kicked(0.3, 0.5)
+    kick = structure.kicked(0.3 * structure.penetration_rate, 0.5 * structure.omega0)
     assert kick[[1, 3]] == pytest.approx([0.3 * structure.penetration_rate, 0.5 * structure.omega0])
     place = structure.state_names.index
     assert not kick[
@@ -178,10 +180,64 @@ def test_a_kick_moves_a_string_with_its_bit(name):
     swings = []
     for scenario in (
         Scenario(kick=(0.0, 0.5)),
-        Scenario(initial={"dtheta": 0.5 * structure.omega0}),
+        Scenario(initial={"dtheta": 0.5 * structure.omega0}, alone=True),
     ):
         run = simulate(case, duration=5.0, scenario=scenario, rtol=1e-5)
         later = run.at(np.linspace(1.0, 5.0, 200)).dtheta / structure.omega0
         swings.append(float(np.abs(later).max()))
     assert 0.25 < swings[0] < 0.5
     assert swings[1] < 0.02
+
+
+def test_a_speed_of_the_bit_is_a_kick_of_its_string():
+    """By name or as a share it is the same; filters and a hook stay as they are."""
+    where = at(string_preset("vertical-3000"), 120.0, 10.0)
+    case, _ = law_controller(where, transfer_control(where.rig.drive, ([1e3, 1e3], [1.0, 4.0])))
+    structure = structure_of(case)
+    feed, speed = 0.3 * structure.penetration_rate, 0.2 * structure.omega0
+    runs = [
+        simulate(case, duration=1e-3, scenario=scenario)
+        for scenario in (
+            Scenario(initial={"dx": feed, "dtheta": speed}),
+            Scenario(kick=(0.3, 0.2)),
+            Scenario(initial={"dx": feed}, kick=(0.0, 0.2)),
+        )
+    ]
+    states = [run.at([0.0], structure.state_names) for run in runs]
+    first, *others = [
+        np.array([getattr(state, n)[0] for n in structure.state_names]) for state in states
+    ]
+    for other in others:
+        np.testing.assert_allclose(other, first, atol=1e-9 * abs(first).max())
+    moves = {n for n, value in zip(structure.state_names, first, strict=True) if value}
+    assert {"dx", "dtheta", "dx1", "dtheta1"} < moves
+    assert all(name.startswith(("dx", "dtheta")) for name in moves)
+
+
+def test_a_bit_whose_turning_is_imposed_takes_its_string_along_the_axis():
+    case = turned_case(at(string_preset("paper-string"), 120.0, 10.0), 3.0)
+    free = structure_of(as_case(at(string_preset("paper-string"), 120.0, 10.0)))
+    led, known = structure_of(case), free.kicked(1.0, 0.0)
+    kick = led.kicked(1.0, 0.5)
+    assert kick[3] == 0.5
+    for i, name in enumerate(led.state_names):
+        if name != "dtheta":
+            assert kick[i] == pytest.approx(known[free.state_names.index(name)], rel=1e-6)
+
+
+def test_a_string_that_cannot_follow_its_bit_is_not_kicked():
+    """Pushed by the bit and held by nothing it runs off, faster and faster."""
+    names = ("x", "dx", "theta", "dtheta", "x1", "dx1")
+    pushed = np.zeros((6, 6))
+    pushed[[0, 2, 4], [1, 3, 5]] = 1.0
+    pushed[5, 0] = 4.0
+    load = np.zeros((6, 2))
+    load[[1, 3], [0, 1]] = -1.0
+    arrays = SimpleNamespace(A=pushed, E=load)
+    with pytest.raises(InputError, match=r"kick = 0\.2: must be 0 where"):
+        kicked_states(arrays, names, 0.2, 0.0)
+    np.testing.assert_array_equal(kicked_states(arrays, names, 0.0, 0.3), [0, 0, 0, 0.3, 0, 0])
+    held = pushed.copy()
+    held[5, 4] = -4.0
+    arrays = SimpleNamespace(A=held, E=load)
+    np.testing.assert_allclose(kicked_states(arrays, names, 0.2, 0.0), [0, 0.2, 0, 0, 0, 0.2])

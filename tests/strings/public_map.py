@@ -117,7 +117,7 @@ def swing(case: Case, transit: float, *, rtol: float = 1e-5, duration: float = D
     kick = -0.3 * case.point.penetration_rate
     string = case.rig.string  # type: ignore[union-attr]
     mode = math.sqrt(2.0 / string.mass)
-    start = Scenario(initial={"dx": kick, "dx1": kick / mode})
+    start = Scenario(initial={"dx": kick, "dx1": kick / mode}, alone=True)
     run = simulate(case, scenario=start, duration=duration * transit, cutting="single", rtol=rtol)
     assert str(run.status) == "done"
     tail = run.on_steps(5, (duration - LOOKED_AT) * transit, ("dtheta",))

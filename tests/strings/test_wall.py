@@ -63,7 +63,7 @@ def swing(wall, duration=8.0, frequency=None, **options):
     case, unit = off_rock(wall, torsional_frequency=frequency)
     line = string_with(None).torsion
     mode = math.sqrt(2.0 / (LENGTH * line.stretches[0].mean().mass))
-    start = Scenario(initial={"dtheta": KICK * unit, "dtheta1": KICK * unit / mode})
+    start = Scenario(initial={"dtheta": KICK * unit, "dtheta1": KICK * unit / mode}, alone=True)
     return simulate(case, scenario=start, duration=duration / unit, rtol=1e-6, **options), unit
 
 

@@ -7,18 +7,23 @@ import pytest
 
 from drillctrl import (
     Axis,
+    Controller,
     Drilling,
     InputError,
+    dimensionless_grid,
     load_table,
     rig_grid,
     save_table,
+    simulate,
     table,
     table1,
 )
 from drillctrl.designs.trials import STARTS, trial_run
 from drillctrl.simulation.scenario import Scenario
+from drillctrl.simulation.status import Status
 from drillctrl.tables.cells import CellTask
 from drillctrl.tables.crossings import crosses
+from drillctrl.tables.export_c import export_c
 from drillctrl.tables.scheduling import scheduled
 
 QUICK = Drilling(kick=0.03)
@@ -89,3 +94,25 @@ def test_trials_are_needed():
         table(grid, "pd", objective=QUICK, trials=False)
     with pytest.raises(InputError, match="limit"):
         table(grid, "pd", objective=QUICK, surroundings={"limit": -1.0})
+
+
+def test_gains_that_turn_a_bit_back_from_rest_are_to_be_switched_on_later(tmp_path):
+    grid = dimensionless_grid(Axis("omega0", (10.0,)), Axis("delta0", (1.75,)), 14.0)
+    made = table(grid, "case2")
+    assert set(made.cautions) == {0}
+    assert "from rest" in made.cautions[0]
+    controller = Controller("case2", *made.structure.gains(made.gains[0]))
+    ends = [
+        simulate(grid.points[0], c, duration=60.0, scenario=Scenario("rest"), backwards="stop")
+        for c in (controller, None)
+    ]
+    assert ends[0].status == Status.REVERSED
+    assert ends[1].status == Status.DONE
+    # That is no reason to refuse them: a bit that turns they bring to rest.
+    assert made.sound.tolist() == [True]
+    assert "1 to be switched on once the bit turns" in made.summary()
+    save_table(made, tmp_path / "t.csv")
+    assert load_table(tmp_path / "t.csv").cautions == made.cautions
+    header, _ = export_c(made, tmp_path, period=0.01, limit=5.0)
+    words = header.read_text().replace("*", " ").split()
+    assert "switch on once the bit turns" in " ".join(words)
