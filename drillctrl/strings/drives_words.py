@@ -61,7 +61,7 @@ def comparison_summary(
         "",
         f"{language.text('depth', rig.string.length, 6)} of string, "
         f"{per * line.wave_impedance:.4g} {slope} of the uppermost pipe,",
-        drive_text(machine, language),
+        wrapped(drive_text(machine, language)),
         "Critical slope: by which the bit's torque may fall per unit of its speed.",
         f"Threshold: for a torque that falls by {drop} over {decay:.3g} rpm.",
         "",
@@ -105,12 +105,13 @@ def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: L
     )
     fall = language.text("torque", falling.drop, 3)
     stay = (
-        f"Stay above {_rpm(speed):.3g} rpm with it"
-        if speed > 0.0
+        f"Against stick-slip stay above {_rpm(speed):.3g} rpm with it"
+        if _rpm(speed) >= 1.0
         else "By this measure no speed is too low for it"
     )
     told += f" {stay}{f' ({beside})' if beside else ''}, if the bit's torque falls by {fall}"
-    return f"{told} as it turns faster (a guess: measure it)."
+    told += " as it turns faster (a guess: measure it)."
+    return f"{told} What grows along the string no drive reaches: analyze says whether any does."
 
 
 def threshold_speed(drive: DriveMeasures) -> float:
@@ -130,7 +131,7 @@ def _where(drive: DriveMeasures) -> str:
 
 def _damping(drive: DriveMeasures, i: int) -> str:
     root = drive.modes[i].root
-    return "absorbed" if root is None else f"{1e2 * root.damping_ratio:.3g}"
+    return "damped out" if root is None else f"{1e2 * root.damping_ratio:.3g}"
 
 
 def _margin(seconds: float) -> str:
