@@ -242,7 +242,11 @@ def checked(found: ReportValues) -> list[str]:
         )
     if found.map is not None:
         points = len(found.map.nodes)
-        told.append(f"The map is of such runs at {points} points, without control and with it.")
+        told.append(
+            f"The map is of simulated runs at {points} points, without control and with it."
+            if found.drives is None
+            else f"The map is of simulated runs at {points} points, under each law."
+        )
     if found.is_lumped:
         told.append(
             "Settings and map are of the string taken as one mass each way; the runs over time are"
