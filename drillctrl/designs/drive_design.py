@@ -156,9 +156,9 @@ class DriveDesign:
             lines += ["", self.motion.text(language)]
         return "\n".join(lines)
 
-    def plot(self, name: str | None = None) -> Figure:
+    def plot(self, name: str | None = None, units: str = "si") -> Figure:
         """Draw ``|r|``, impedance, and damping over frequency, under the name of the rig."""
-        return self.found.plot(name)
+        return self.found.plot(name, units)
 
 
 @checks_kinds

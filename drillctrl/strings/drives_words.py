@@ -173,7 +173,7 @@ def settings_text(control: DriveControl, language: Language = SI) -> str:
     """Return a law in one line: in the words of a drive, else its transfer functions in SI."""
     rows = drive_settings(control, language)
     if language is SI or rows[0][0] != "P":
-        return law_text(control)
+        return law_text(control, language)
     return ", ".join(f"{name} {value}" for name, value in rows)
 
 
@@ -186,15 +186,16 @@ def setting_sentence(control: DriveControl, language: Language) -> str:
     return f"Set {settings} of the drive ({control.name})."
 
 
-def law_text(control: DriveControl) -> str:
+def law_text(control: DriveControl, language: Language = SI) -> str:
     """Return a law in words: gains of PI control, else its transfer functions of s in 1/s."""
     integral, rest = without_integral(control.speed)
     told = []
     if len(rest.denominator) == 1 and len(rest.numerator) <= 2:
         gains = [part / rest.denominator[0] for part in rest.numerator]
-        told.append(f"Kp {gains[-1] / 1e3:.4g} kN·m·s/rad, Ki {integral / 1e3:.4g} kN·m/rad")
+        told.append(f"Kp {language.text('drive_impedance', gains[-1])}")
+        told.append(f"Ki {language.text('drive_stiffness', integral)}")
         if len(gains) == 2 and gains[0]:
-            told.append(f"inertia compensated {-gains[0]:.4g} kg·m²")
+            told.append(f"inertia compensated {language.text('inertia', -gains[0])}")
     else:
         told.append(f"on speed {_transfer_text(control.speed)} N·m·s/rad")
     if control.torque:
