@@ -57,4 +57,4 @@ for each, label in ((free, "without control"), (run, "with control")):
     ax.plot(times * table1().time_scale, speed * rpm, linewidth=0.8, label=label)
 ax.set_xlabel("time, s")
 ax.set_ylabel("bit speed, rpm")
-ax.legend(loc="upper right")
+figure.legend(loc="outside upper center", ncols=2)

@@ -159,7 +159,7 @@ def told_language(units: str | None) -> Language:
     InputError
         If there is none of that name, or it has none.
     """
-    found = language_named(units, with_rig=True)
+    found = LANGUAGES.get(units or SI.name, DIMENSIONLESS)
     if found is DIMENSIONLESS:
-        raise InputError("units", found.name, "si or field: without a point there is no scale")
+        raise InputError("units", units, "si or field: without a point there is no scale")
     return found

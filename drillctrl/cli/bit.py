@@ -103,6 +103,7 @@ def bit_command(
     check_figure(plot)
     wanted = _read(amplitudes)
     where = read_point(point)
+    _tell_of_drive(where)
     if amplitude and amplitudes is not None:
         raise InputError("--amplitude", amplitude[0], "left out with --amplitudes")
     if amplitude:
@@ -148,6 +149,18 @@ def bit_command(
     draw = functools.partial(found.plot, name=rig_name(point))
     fields = motion_fields(found, responses)
     deliver(fields, text, draw, as_json=as_json, out=out, plot=plot)
+
+
+def _tell_of_drive(where: Any) -> None:
+    """Say of a rig with a top drive what turns its string here."""
+    from drillctrl.strings.rig import StringRig
+
+    rig = getattr(where, "rig", None)
+    if isinstance(rig, StringRig) and rig.drive is not None:
+        told = "its torque is constant here, under no law; it takes a minute and more of a string"
+        click.echo(f"drillctrl: note: a top drive turns it: {told}", err=True)
+        other = "compare --objective drilling says what laws of it leave of such swings"
+        click.echo(f"drillctrl: note: {other}", err=True)
 
 
 def _band(

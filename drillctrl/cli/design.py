@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from drillctrl.base.errors import InputError
+from drillctrl.cli.drive_law import designed_structure
 from drillctrl.cli.drives import are_drives, deliver_drive_design, keep_option
 from drillctrl.cli.gains import read_bounds, scales_at
 from drillctrl.cli.objective import (
@@ -32,11 +33,9 @@ from drillctrl.cli.verb import Verb
 @point_options
 @click.option(
     "--structure",
-    default="case1",
-    show_default=True,
-    help="p: θ; case1: θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed; of a top "
-    "drive: stiff, soft-torque, z-torque, observer-2 by their rules, z-torque-tuned and "
-    "dynamic-1 … dynamic-4 optimised.",
+    help="p: θ; case1 (default): θ and delayed θ; pd: θ, θ'; case2: θ, θ', both also delayed; of "
+    "a top drive: stiff, soft-torque (default there), z-torque, observer-2 by their rules, "
+    "z-torque-tuned and dynamic-1 … dynamic-4 optimised.",
 )
 @click.option(
     "--bound",
@@ -58,7 +57,7 @@ from drillctrl.cli.verb import Verb
 @keep_option()
 @root_output_options
 def design_command(
-    structure: str,
+    structure: str | None,
     bound: tuple[str, ...],
     seed: int,
     trials: str,
@@ -84,6 +83,7 @@ def design_command(
       drillctrl design --objective worst-case --psi-error 0.2 --min-decay 0.1
     """
     check_outputs(out, plot)
+    structure = structure or designed_structure(options["rig"])
     if are_drives([structure]):
         tried = wants_trials(trials)
         stable = deliver_drive_design(structure, options, as_json, out, plot, tried, workers)

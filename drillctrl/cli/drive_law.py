@@ -62,6 +62,19 @@ def meant_structure(
     return "stiff"
 
 
+def designed_structure(rig: str | None) -> str:
+    """Return the structure that is designed where none was typed; of a top drive it is said."""
+    from drillctrl.strings.files import load_rig
+    from drillctrl.strings.rig import StringRig
+
+    known = None if rig is None else load_rig(rig)
+    if not isinstance(known, StringRig) or known.drive is None:
+        return "case1"
+    told = "soft torque is designed, as no law was given; compare holds laws against each other"
+    click.echo(f"drillctrl: note: {told}", err=True)
+    return "soft-torque"
+
+
 def driven_case(
     where: OperatingPoint | RigPoint,
     structure: str,

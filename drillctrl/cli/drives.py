@@ -173,7 +173,7 @@ def deliver_drive_design(
     )
     units = point.get("units") or "si"
     text = functools.partial(found.summary, units)
-    draw = functools.partial(found.plot, rig_name(point))
+    draw = functools.partial(found.plot, rig_name(point), units)
     deliver(found.to_dict(), text, draw, as_json=as_json, out=out, plot=plot)
     return found.stable and found.recommended is not False
 
@@ -338,5 +338,5 @@ def deliver_drives(
         text += "\n\n" + motion.text(told_language(point.get("units") or "si"))
     _write(found, out, fields)
     if given["plot"] is not None:
-        write_figure(given["plot"], found.plot(rig_name(point)))
+        write_figure(given["plot"], found.plot(rig_name(point), point.get("units") or "si"))
     click.echo(json_text(fields) if as_json else plain(text))

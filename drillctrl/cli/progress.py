@@ -38,10 +38,31 @@ def open_progress() -> Iterator[Progress | None]:
         now = time.monotonic()
         spent = now - since.setdefault(stage, now)
         # The first was done before the clock ran.
-        left = f", {spent / (done - 1) * (total - done):.0f} s left" if spent > 1.0 else ""
+        left = (
+            f", {spent / (done - 1) * (total - done):.0f} s left"
+            if spent > 1.0 and done > 1
+            else ""
+        )
         click.echo(f"\r\x1b[K{done}/{total} {stage}{left}", nl=False, err=True)
 
     try:
         yield show
     finally:
         click.echo("\r\x1b[K", nl=False, err=True)
+
+
+@contextlib.contextmanager
+def open_run_progress(duration: float, runs: int = 1) -> Iterator[Callable[[float], None] | None]:
+    """Yield what says which share of one or several runs after each other is done."""
+    with open_progress() as show:
+        if show is None:
+            yield None
+            return
+        over, last = 0, 0.0
+
+        def hear(reached: float) -> None:
+            nonlocal over, last
+            over, last = over + (reached < last), reached
+            show("% of the motion", round(100.0 * (over + reached / duration) / runs), 100)
+
+        yield hear

@@ -71,6 +71,7 @@ class _Asked:
     "--out", type=click.Path(), help="FILE.html (a page), .json, or .csv (the bit's motion)."
 )
 @click.option("--plot", type=click.Path(), help="Draw what it shows: FILE.png, .svg, .pdf.")
+@click.option("--units", metavar="NAME", help="In si (default) or field: ft·lbf, klbf …")
 def record_command(
     file: str,
     fitted: str | None,
@@ -80,6 +81,7 @@ def record_command(
     as_json: bool,
     out: str | None,
     plot: str | None,
+    units: str | None,
     **options: Any,
 ) -> None:
     """Say what a rig's recording shows, and fit the string to it.
@@ -96,6 +98,9 @@ def record_command(
     --map takes seconds for a run: the fitted string and law of the bit over the speeds and weights
     that were drilled with, beside what was drilled. It needs weight on bit, and --rig.
     """
+    from drillctrl.base.language import told_language
+
+    told_language(units)
     check_folder("--out", out)
     if out is not None and Path(out).suffix.lower() not in _ENDINGS:
         raise InputError("--out", out, f"a file that ends in {', '.join(_ENDINGS)}")
@@ -117,10 +122,10 @@ def record_command(
     if fitted is not None:
         _write_fit(study, _rig(asked.rig), fitted)
     if out is not None:
-        _write(study, out)
+        _write(study, out, units)
     if plot is not None:
-        write_figure(plot, study.plot())
-    click.echo(json_text(study.to_dict()) if as_json else plain(study.summary()))
+        write_figure(plot, study.plot(units))
+    click.echo(json_text(study.to_dict()) if as_json else plain(study.summary(units)))
 
 
 def _study(asked: _Asked) -> RecordStudy:
@@ -200,14 +205,14 @@ def _write_fit(study: RecordStudy, rig: Rig, fitted: str) -> None:
         writing("--fit", fitted, lambda: save_fit(rig, fit, fitted))
 
 
-def _write(study: RecordStudy, out: str) -> None:
+def _write(study: RecordStudy, out: str, units: str | None) -> None:
     ending = Path(out).suffix.lower()
     if ending == ".json":
         write_json(out, study.to_dict())
     elif ending == ".csv":
-        writing("--out", out, lambda: study.save_bit(out))
+        writing("--out", out, lambda: study.save_bit(out, units))
     else:
         from drillctrl.base.files import write_text
 
-        page = study.to_html()
+        page = study.to_html(units)
         writing("--out", out, lambda: write_text(out, page))

@@ -53,7 +53,7 @@ def report_command(
       drillctrl report --rig table1 --speed "150 rpm" --rop "65 ft/h" --structure p --no-map \\
           --units field --date 2026-11-29 --out report.html
 
-    Without --no-map, and for long strings, it takes up to a minute.
+    Without --no-map it takes up to a minute, of long strings two.
     """
     check_folder("--out", out)
     from drillctrl.base.errors import checked_integer

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +13,7 @@ from drillctrl.cli.drives import are_drives
 from drillctrl.cli.motions import FIGURES, Wanted, deliver_run, deliver_starts
 from drillctrl.cli.output import check_figure, check_folder
 from drillctrl.cli.point import point_options, read_point, rig_name
+from drillctrl.cli.progress import open_run_progress
 from drillctrl.cli.roots import NOT_STABILISED
 from drillctrl.cli.scenario import (
     controller_options,
@@ -26,6 +28,7 @@ from drillctrl.cli.verb import Verb
 if TYPE_CHECKING:
     from drillctrl.simulation.controller import Controller
     from drillctrl.simulation.result import Simulation
+    from drillctrl.simulation.starts import StartRun
 
 
 @click.command(name="simulate", cls=Verb)
@@ -170,17 +173,23 @@ def simulate_command(
         checked_run(checked, **check, model="linear")
     if time_limit is not None:
         common["time_limit"] = checked_number("time_limit", time_limit, 0.0, open_low=True)
-    if starts is not None:
-        names = read_starts(starts, possible_starts(place, model == "linear"))
-        made = start_runs(
-            place, controller, starts=names, changes=scenario.changes, **common, model=model
-        )
-        calm = deliver_starts(made, len(names), wanted, as_json)
-    else:
+    if starts is None:
 
         def again(model: str) -> Simulation:
-            return simulate(place, controller, **common, scenario=scenario, model=model)
+            with open_run_progress(length) as progress:
+                return simulate(
+                    place, controller, **common, scenario=scenario, model=model, progress=progress
+                )
 
         calm = deliver_run(again, model, wanted, floquet, as_json)
+    else:
+        names = read_starts(starts, possible_starts(place, model == "linear"))
+        common |= {"starts": names, "changes": scenario.changes, "model": model}
+
+        def made() -> Iterator[StartRun]:
+            with open_run_progress(length, len(names)) as progress:
+                yield from start_runs(place, controller, **common, progress=progress)
+
+        calm = deliver_starts(made(), len(names), wanted, as_json)
     if require_stable and not calm:
         raise click.exceptions.Exit(NOT_STABILISED)

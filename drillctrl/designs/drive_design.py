@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +16,8 @@ from drillctrl.designs.drilling import Drilling
 from drillctrl.designs.drive_load import bit_load
 from drillctrl.designs.drive_motion import DriveMotion, drive_motion
 from drillctrl.designs.drive_trials import DriveTrials, best_tried, drive_trials, trials_text
+from drillctrl.designs.result import Analysis, dominant_kind
+from drillctrl.designs.words import vibration_text
 from drillctrl.drilling.case import as_case
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.rig import Rig
@@ -39,8 +40,6 @@ from drillctrl.strings.rig import StringRig
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from drillctrl.designs.result import Analysis
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +156,9 @@ class DriveDesign:
         if self.box:
             lines += ["", wrapped(f"Over what is known of the string: {box_told(self.box)}.")]
         if self.drilling is not None:
-            said = self.drilling
-            lines += ["", f"At the point: {self._outcome(said)}"]
+            loop, kind = self.drilling.loop, dominant_kind(self.drilling)
+            told = vibration_text(loop, self.found.rig.time_scale, kind)
+            lines += ["", f"At the point: {told}"]
             if self.modes is not None:
                 lines += [f"  {text}" for _, text in self.modes.lines]
         if self.trials and self.drilling is not None:
@@ -167,19 +167,9 @@ class DriveDesign:
             lines += ["", self.motion.text(language)]
         return "\n".join(lines)
 
-    def _outcome(self, said: Analysis) -> str:
-        """Return what becomes of vibration, and of which, with the frequency in Hz."""
-        rig = said.case.rig
-        assert rig is not None
-        hertz = abs(said.loop.dominant_roots[0].value.imag) / (2.0 * math.pi * rig.time_scale)
-        rate = said.spectral_abscissa / rig.time_scale
-        if said.stable:
-            return f"all vibration dies away, {hertz:.3g} Hz slowest, by {-rate:.3g} 1/s"
-        return f"vibration GROWS, {hertz:.3g} Hz fastest, by {rate:.3g} 1/s"
-
-    def plot(self, name: str | None = None) -> Figure:
+    def plot(self, name: str | None = None, units: str = "si") -> Figure:
         """Draw ``|r|``, impedance, and damping over frequency, under the name of the rig."""
-        return self.found.plot(name)
+        return self.found.plot(name, units)
 
 
 @checks_kinds

@@ -12,7 +12,7 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.text import finite_or_none, set_out
 from drillctrl.designs.quieter import Quieter, quieter
 from drillctrl.designs.remedies import Remedy, remedies
-from drillctrl.designs.result import Analysis, Design
+from drillctrl.designs.result import Analysis, Design, dominant_kind
 from drillctrl.designs.robustness import GIVE_UP, Robustness, robust_alternative, robustness_of
 from drillctrl.designs.words import Lines, decay_text, design_lines, rate_text, result_lines
 from drillctrl.drilling.gain_units import gain_texts
@@ -70,6 +70,8 @@ class Report:
         With what the motion is quiet without control, where a design on it is refused.
     modes : NamedRoots or None
         Roots by the modes of a string of pipe, and the drive that turns it.
+    kind : str or None
+        ``"axial"`` or ``"torsional"``, where that motion alone makes the first root.
     """
 
     result: Analysis
@@ -79,6 +81,7 @@ class Report:
     remedies: tuple[Remedy, ...]
     quieter: tuple[Quieter, ...] = ()
     modes: NamedRoots | None = None
+    kind: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON fields of the command line."""
@@ -105,11 +108,11 @@ class Report:
         """Return a text for people, in rig units too where a rig was given."""
         design = self.result
         if isinstance(design, Design):
-            lines = [*design_lines(design), *_boundary_lines(design, self.boundary)]
+            lines = [*design_lines(design, self.kind), *_boundary_lines(design, self.boundary)]
             lines += _remedy_lines(design, self.remedies)
             lines += _quieter_lines(design, self.quieter)
         else:
-            lines = result_lines(design)
+            lines = result_lines(design, self.kind)
         if self.modes is not None:
             lines += self.modes.lines
         if self.robustness is not None:
@@ -148,7 +151,7 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
         stands = robustness_of(result, with_point=soon)
     modes = named_roots(result.case, result.structure, result.K1, result.K2)
     if not isinstance(result, Design):
-        return Report(result, stands, None, None, (), modes=modes)
+        return Report(result, stands, None, None, (), modes=modes, kind=dominant_kind(result))
     at("bounds")
     decision = boundary_decision(result)
     other = None
@@ -163,7 +166,8 @@ def report(result: Analysis, progress: Progress | None = None) -> Report:
     if result.on_motion is not None and result.verdict.refused:
         at("what would be quiet")
         quiet = quieter(result.case)
-    return Report(result, stands, decision, other, helps, quiet, modes)
+    kind = dominant_kind(result)
+    return Report(result, stands, decision, other, helps, quiet, modes, kind)
 
 
 def boundary_decision(design: Design) -> BoundaryDecision | None:

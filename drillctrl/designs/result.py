@@ -11,7 +11,7 @@ from drillctrl.base.text import set_out
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.fields import design_fields, result_fields
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER, analyze_loop, discretised_radius
-from drillctrl.designs.mode_shift import ModeShift, mode_shifts
+from drillctrl.designs.mode_shift import ModeShift, mode_kind, mode_shifts
 from drillctrl.designs.values import AnalysisValues, DesignValues, closed_loop
 from drillctrl.designs.verdict import try_gains
 from drillctrl.designs.words import design_lines, result_lines
@@ -150,6 +150,16 @@ def analysis_fields(result: Analysis) -> dict[str, Any]:
     return {item.name: getattr(result, item.name) for item in fields(Analysis)}
 
 
+def dominant_kind(result: Analysis) -> str | None:
+    """Return which motion alone takes part in the first root; see `mode_kind`."""
+    first = result.loop.dominant_roots[0].value
+    return mode_kind(result.system(), first, _quantities(result.case))
+
+
+def _quantities(case: Case) -> tuple[str, ...]:
+    return () if case.plant is None else tuple(s.quantity for s in case.plant.linear.states)
+
+
 def assess(
     case: Case,
     feedback: FeedbackStructure | None,
@@ -164,9 +174,7 @@ def assess(
     loop = analyze_loop(system)
     worse: tuple[ModeShift, ...] = ()
     if feedback is not None:
-        known = () if case.plant is None else case.plant.linear.states
-        quantities = tuple(state.quantity for state in known)
-        shifts = mode_shifts(plant, feedback, K1, K2, quantities)
+        shifts = mode_shifts(plant, feedback, K1, K2, _quantities(case))
         worse = tuple(shift for shift in shifts if shift.worse)
     alone = loop if feedback is None else analyze_loop(plant)
     radius = discretised_radius(system, m, order)

@@ -21,35 +21,47 @@ Lines = list[tuple[str, str]]
 _SHOWN = 0.05
 _OF_RIG = {"theta": "its angle", "dtheta": "its speed", "x": "its place", "dx": "its rate"}
 _SIGNALS = {"theta": "θ", "dtheta": "θ'", "x": "x", "dx": "x'", "phi": "φ", "dphi": "φ'"}
+_ALONG = {"axial": " along the string", "torsional": " in torsion"}
 _VERDICTS = {True: "Recommended", False: "REFUSED", None: "Not tried"}
 
 
-def result_lines(result: AnalysisValues) -> Lines:
-    """Return what is known of gains, or of an open loop."""
+def result_lines(result: AnalysisValues, kind: str | None = None) -> Lines:
+    """Return what is known of gains, or of an open loop, whose first root is of one motion."""
     word = "stabilised" if result.stable else "not stabilised"
     if result.structure is None:
         word = "stable" if result.stable else "not stable"
     return [
-        *_answer_lines(result),
+        *_answer_lines(result, kind),
         *_opening(result),
         *_loop_lines(result, f"{word}: α = ", []),
     ]
 
 
-def _answer_lines(result: AnalysisValues) -> Lines:
+def _answer_lines(result: AnalysisValues, kind: str | None) -> Lines:
     """Say first, of a rig, what becomes of small vibration; of gains that were tried, runs say."""
     rig = result.case.told_rig
     if rig is None or result.trials:
         return []
-    rate = result.loop.spectral_abscissa / rig.time_scale
-    hertz = abs(result.loop.dominant_roots[0].value.imag) / (2.0 * math.pi * rig.time_scale)
+    lines = [("Vibration", f"small {vibration_text(result.loop, rig.time_scale, kind)}")]
+    if not result.loop.stable:
+        if kind == "axial":
+            lines.append(("", "the cuts of the bit feed it, where torque hardly reaches"))
+        lines.append(("", "simulate says how far it goes, and whether the bit sticks"))
+    return lines
+
+
+def vibration_text(loop: LoopAnalysis, time_scale: float, kind: str | None) -> str:
+    """Say what becomes of vibration, of which motion, with frequency in Hz and rate in 1/s."""
+    rate = loop.spectral_abscissa / time_scale
+    hertz = abs(loop.dominant_roots[0].value.imag) / (2.0 * math.pi * time_scale)
     which = f"{hertz:.3g} Hz" if hertz else "without swinging"
-    if result.loop.stable:
-        return [("Vibration", f"small vibration dies away, slowest {which}, by {-rate:.3g} 1/s")]
-    return [("Vibration", f"small vibration GROWS, fastest {which}, by {rate:.3g} 1/s")]
+    which += _ALONG.get(kind or "", "")
+    if loop.stable:
+        return f"vibration dies away, slowest {which}, by {-rate:.3g} 1/s"
+    return f"vibration GROWS, fastest {which}, by {rate:.3g} 1/s"
 
 
-def design_lines(design: DesignValues) -> Lines:
+def design_lines(design: DesignValues, kind: str | None = None) -> Lines:
     """Return what is known of gains that were designed."""
     word = "stabilised: α = " if design.stable else "not stabilised: best α = "
     if design.on_motion is not None:
@@ -64,7 +76,7 @@ def design_lines(design: DesignValues) -> Lines:
     first, *rest = _opening(design)
     return [
         first,
-        *_answer_lines(design),
+        *_answer_lines(design, kind),
         *rest,
         *_motion_lines(design),
         *_loop_lines(design, word, _objective_lines(design)),

@@ -29,6 +29,7 @@ Options = Mapping[str, Any]
 
 _MOST_ROOTS = 16
 _MOST_POINTS = 1200
+_MANY_STATES = 100
 _BESIDE = ("stiff", "soft-torque", "z-torque")
 _MODES = 3
 
@@ -47,7 +48,10 @@ def roots(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     loops[asked.given.get("structure") or "without control"] = own
     series = []
     for name, system in loops.items():
-        found = approximate_roots(system, 2 * degree_for(system))[:_MOST_ROOTS]
+        # The time of a sketch goes into these; the degree is for the fastest of many elements.
+        sketched = options.get("rough") and system.order >= _MANY_STATES
+        degree = max(1, degree_for(system) // 2) if sketched else 2 * degree_for(system)
+        found = approximate_roots(system, degree)[:_MOST_ROOTS]
         found = found[found.real > found.real[0] - 12.0]
         series.append({"name": name, "x": rate * found.real, "y": turn * found.imag})
     drawn: dict[str, Any] = {

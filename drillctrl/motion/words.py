@@ -11,6 +11,9 @@ from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import DrillingMotion, ModeSwing
 from drillctrl.motion.units import Units, told_units
 
+# From this share of the speed on, a swing that still grows is at the point of sticking.
+_NEAR_STICK = 0.8
+
 
 def theory_lines(lines: Sequence[str]) -> list[str]:
     """Return lines that a rig is told with ``--verbose`` alone."""
@@ -132,7 +135,10 @@ def verdict(swing: ModeSwing, *, of_rig: bool = False) -> list[str]:
     if of_rig and largest.sign < 0 and largest is not smallest:
         told.append(f"Those by {size(largest.amplitude)} decay too.")
     if largest.sign > 0:
-        told.append(f"Grows at {at}{size(largest.amplitude)} still: until the bit sticks.")
+        beyond = "what larger ones do was not looked at"
+        if largest.amplitude >= _NEAR_STICK:
+            beyond = "until the bit sticks"
+        told.append(f"Grows at {at}{size(largest.amplitude)} still: {beyond}.")
     unsure = [each.amplitude for each in swing.at if not each.sign]
     if unsure:
         listed = ", ".join(size(a) for a in unsure)

@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.figure import BLUE, GREEN, GREY, ORANGE, axis_name, headline
+from drillctrl.base.language import SI, Language
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,13 +39,20 @@ def plot_motion(
     _legend_above(ax)
 
 
-def plot_torque(ax: Axes, time: FloatArray, torque: FloatArray, carried: FloatArray | None) -> None:
-    """Draw torques in kN·m over seconds."""
+def plot_torque(
+    ax: Axes,
+    time: FloatArray,
+    torque: FloatArray,
+    carried: FloatArray | None,
+    told: Language = SI,
+) -> None:
+    """Draw torques over seconds."""
+    unit, scale = told.units["torque"]
     if carried is not None:
-        ax.plot(time, 1e-3 * carried, color=ORANGE, linewidth=1.0, label="bit, from the surface")
-    ax.plot(time, 1e-3 * torque, color=BLUE, linewidth=1.1, label="measured at the top")
+        ax.plot(time, scale * carried, color=ORANGE, linewidth=1.0, label="bit, from the surface")
+    ax.plot(time, scale * torque, color=BLUE, linewidth=1.1, label="measured at the top")
     ax.set_xlabel(axis_name("time", "s"))
-    ax.set_ylabel(axis_name("torque", "kN·m"))
+    ax.set_ylabel(axis_name("torque", unit))
     _legend_above(ax)
 
 
@@ -81,10 +89,12 @@ def plot_spectrum(
     density: FloatArray,
     modes: Sequence[tuple[float, float]],
     period: float | None,
+    told: Language = SI,
 ) -> None:
     """Draw the torque's spectrum, with modes and their errors, and the swing's own line."""
+    unit, scale = told.units["torque"]
     shown = (frequency > 0.02) & (frequency < 5.0)
-    ax.loglog(frequency[shown], 1e-3 * np.sqrt(density[shown]), color=BLUE, linewidth=0.8)
+    ax.loglog(frequency[shown], scale * np.sqrt(density[shown]), color=BLUE, linewidth=0.8)
     for i, (place, error) in enumerate(modes):
         label = "modes" if i == 0 else None
         ax.axvspan(place - error, place + error, color=ORANGE, alpha=0.45, label=label)
@@ -92,18 +102,23 @@ def plot_spectrum(
     if period is not None:
         ax.axvline(1.0 / period, color=GREEN, linestyle="--", linewidth=1.1, label="stick-slip")
     ax.set_xlabel(axis_name("frequency", "Hz"))
-    ax.set_ylabel(headline(axis_name("torque per root of frequency", "kN·m/√Hz"), 28))
+    ax.set_ylabel(headline(axis_name("torque per root of frequency", f"{unit}/√Hz"), 28))
     if modes or period is not None:
         ax.legend(fontsize="small")
 
 
 def plot_drive(
-    ax: Axes, frequency: FloatArray, impedance: FloatArray, reflection: FloatArray | None
+    ax: Axes,
+    frequency: FloatArray,
+    impedance: FloatArray,
+    reflection: FloatArray | None,
+    told: Language = SI,
 ) -> None:
     """Draw what a drive returns of waves, or its impedance where the pipe is not known."""
     if reflection is None:
-        ax.loglog(frequency, impedance, ".", color=BLUE, markersize=4)
-        ax.set_ylabel(axis_name("impedance of the drive", "N·m·s/rad"))
+        unit, scale = told.units["impedance"]
+        ax.loglog(frequency, scale * impedance, ".", color=BLUE, markersize=4)
+        ax.set_ylabel(axis_name("impedance of the drive", unit))
     else:
         ax.semilogx(frequency, reflection, ".", color=BLUE, markersize=4)
         ax.set_ylim(0.0, 1.2)
@@ -120,23 +135,25 @@ def plot_drilled(
     weight: FloatArray,
     swing: FloatArray,
     computed: tuple[FloatArray, FloatArray, FloatArray] | None = None,
+    told: Language = SI,
 ) -> None:
-    """Draw the index over what was drilled with, rpm and kN, above what was computed there.
+    """Draw the index over what was drilled with, speed and weight, above what was computed there.
 
     ``computed`` is speeds (x,), weights (y,) and indices (x, y).
     """
+    unit, scale = told.units["force"]
     if computed is not None:
         ax.set_facecolor("#BBBBBB")
         ax.pcolormesh(
-            _RPM * computed[0], 1e-3 * computed[1], np.ma.masked_invalid(computed[2].T),
+            _RPM * computed[0], scale * computed[1], np.ma.masked_invalid(computed[2].T),
             shading="nearest", cmap="YlOrRd", vmin=0.0, vmax=1.5,
         )  # fmt: skip
     drawn = ax.scatter(
-        _RPM * speed, 1e-3 * weight, c=swing, cmap="YlOrRd", vmin=0.0, vmax=1.5, s=26,
+        _RPM * speed, scale * weight, c=swing, cmap="YlOrRd", vmin=0.0, vmax=1.5, s=26,
         edgecolors=GREY if computed is None else "black", linewidths=0.6,
     )  # fmt: skip
     ax.set_xlabel(axis_name("rotary speed", "rpm"))
-    ax.set_ylabel(axis_name("weight on bit", "kN"))
+    ax.set_ylabel(axis_name("weight on bit", unit))
     ax.figure.colorbar(drawn, ax=ax, label=axis_name("stick-slip index"), extend="max")
 
 
@@ -145,11 +162,13 @@ def plot_law(
     speed: FloatArray,
     torque: FloatArray,
     law: tuple[FloatArray, FloatArray] | None,
+    told: Language = SI,
 ) -> None:
-    """Draw torque over speed at the bit, kN·m over rpm, and the law that was fitted."""
-    ax.plot(_RPM * speed, 1e-3 * torque, ".", color=BLUE, markersize=1.5, alpha=0.4)
+    """Draw torque over speed at the bit, and the law that was fitted."""
+    unit, scale = told.units["torque"]
+    ax.plot(_RPM * speed, scale * torque, ".", color=BLUE, markersize=1.5, alpha=0.4)
     if law is not None:
-        ax.plot(_RPM * law[0], 1e-3 * law[1], color=ORANGE, linewidth=1.6, label="fitted law")
+        ax.plot(_RPM * law[0], scale * law[1], color=ORANGE, linewidth=1.6, label="fitted law")
         ax.legend(fontsize="small")
     ax.set_xlabel(axis_name("rotary speed of the bit", "rpm"))
-    ax.set_ylabel(axis_name("torque at the bit", "kN·m"))
+    ax.set_ylabel(axis_name("torque at the bit", unit))

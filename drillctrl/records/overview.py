@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.figure import new_axes, new_figure
+from drillctrl.base.language import Language
 from drillctrl.records import figure as drawing
 from drillctrl.records.downhole import mean_weight, relative_weight
 from drillctrl.records.peaks import spectral_density
@@ -26,8 +27,8 @@ _LAW = "The bit's torque over its speed"
 _AT_MEAN = "The bit's torque over its speed, at the mean weight"
 
 
-def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
-    """Return titles and what draws each figure on Axes."""
+def study_figures(study: Findings, told: Language) -> list[tuple[str, Callable[[Axes], None]]]:
+    """Return titles and what draws each figure on Axes, in units as told."""
     found: list[tuple[str, Callable[[Axes], None]]] = []
     record, values = study.record, study.record.values
     near = _excerpt(study)
@@ -50,7 +51,7 @@ def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
         found.append(
             (
                 "Torque in the middle of the record",
-                lambda ax: drawing.plot_torque(ax, time, torque[near], carried),
+                lambda ax: drawing.plot_torque(ax, time, torque[near], carried, told),
             )
         )
     severity, name = study.severity, "stick-slip index of the bit"
@@ -72,7 +73,7 @@ def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
                 lambda ax: drawing.plot_period(ax, period.times, period.values),
             )
         )
-    spectrum = _spectrum(study)
+    spectrum = _spectrum(study, told)
     if spectrum is not None:
         found.append(("Spectrum of the torque", spectrum))
     if study.drive is not None:
@@ -81,22 +82,22 @@ def study_figures(study: Findings) -> list[tuple[str, Callable[[Axes], None]]]:
             (
                 "What the drive returns",
                 lambda ax: drawing.plot_drive(
-                    ax, seen.frequency, np.abs(seen.impedance), seen.reflection
+                    ax, seen.frequency, np.abs(seen.impedance), seen.reflection, told
                 ),
             )
         )
-    drilled = _drilled(study)
+    drilled = _drilled(study, told)
     if drilled is not None:
         computed = "" if study.computed is None else f" (dots), and computed, {study.computed.top}"
         found.append((f"What was drilled{computed}", drilled))
     if bit is not None:
-        found.append((_LAW if _reference(study) is None else _AT_MEAN, _law(study)))
+        found.append((_LAW if _reference(study) is None else _AT_MEAN, _law(study, told)))
     return found
 
 
-def draw_study(study: Findings) -> Figure:
+def draw_study(study: Findings, told: Language) -> Figure:
     """Draw all figures of a recording on one sheet."""
-    figures = study_figures(study)
+    figures = study_figures(study, told)
     rows = (len(figures) + 1) // 2
     sheet = new_figure(12.0, 3.2 * rows)
     grid = sheet.subplots(rows, 2, squeeze=False)
@@ -108,10 +109,10 @@ def draw_study(study: Findings) -> Figure:
     return sheet
 
 
-def separate_figures(study: Findings) -> list[tuple[str, Axes]]:
+def separate_figures(study: Findings, told: Language) -> list[tuple[str, Axes]]:
     """Return titles and figures, each its own."""
     made = []
-    for title, draw in study_figures(study):
+    for title, draw in study_figures(study, told):
         ax = new_axes(6.4, 3.4)
         draw(ax)
         ax.set_title(title, fontsize="medium")
@@ -131,7 +132,7 @@ def _excerpt(study: Findings) -> slice:
     return slice(begin, begin + max(2, int(length / record.step)))
 
 
-def _spectrum(study: Findings) -> Callable[[Axes], None] | None:
+def _spectrum(study: Findings, told: Language) -> Callable[[Axes], None] | None:
     record = study.record
     if "torque" not in record.values:
         return None
@@ -142,10 +143,10 @@ def _spectrum(study: Findings) -> Callable[[Axes], None] | None:
     frequency, density, _ = spectral_density(pieces, record.step)
     modes = [(mode.frequency, mode.error) for mode in study.modes]
     period = None if study.period is None else study.period.value
-    return lambda ax: drawing.plot_spectrum(ax, frequency, density, modes, period)
+    return lambda ax: drawing.plot_spectrum(ax, frequency, density, modes, period, told)
 
 
-def _drilled(study: Findings) -> Callable[[Axes], None] | None:
+def _drilled(study: Findings, told: Language) -> Callable[[Axes], None] | None:
     rows = [row for row in study.drilled() if row["weight_on_bit"] is not None]
     if not rows:
         return None
@@ -155,7 +156,7 @@ def _drilled(study: Findings) -> Callable[[Axes], None] | None:
     )
     runs = study.computed
     below = None if runs is None else (runs.speeds, runs.weights, runs.swing)
-    return lambda ax: drawing.plot_drilled(ax, speed, weight, swing, below)
+    return lambda ax: drawing.plot_drilled(ax, speed, weight, swing, below, told)
 
 
 def _reference(study: Findings) -> float | None:
@@ -164,7 +165,7 @@ def _reference(study: Findings) -> float | None:
     return mean_weight(study.record) if fit is None else fit.weight_on_bit
 
 
-def _law(study: Findings) -> Callable[[Axes], None]:
+def _law(study: Findings, told: Language) -> Callable[[Axes], None]:
     bit = study.bit
     assert bit is not None
     known = np.flatnonzero(np.isfinite(bit.speed))
@@ -176,4 +177,4 @@ def _law(study: Findings) -> Callable[[Axes], None]:
     if study.fit is not None and study.string_from == "fit":
         over = np.linspace(0.0, max(float(speed.max()), 1.0), 200)
         law = over, study.fit.law.torque(over)
-    return lambda ax: drawing.plot_law(ax, speed, torque, law)
+    return lambda ax: drawing.plot_law(ax, speed, torque, law, told)

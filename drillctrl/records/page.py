@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drillctrl.base.language import Language
 from drillctrl.base.templates import filled
 
 if TYPE_CHECKING:
@@ -15,19 +16,19 @@ if TYPE_CHECKING:
     from drillctrl.records.findings import Findings
 
 
-def record_page(study: Findings) -> str:
+def record_page(study: Findings, told: Language) -> str:
     """Return the page; see `RecordStudy.to_html`."""
     from drillctrl.records.overview import separate_figures
     from drillctrl.records.words import record_rows, verdict
 
-    figures = [(title, _image(ax)) for title, ax in separate_figures(study)]
+    figures = [(title, _image(ax)) for title, ax in separate_figures(study, told)]
     record = study.record
     return filled(
         "drillctrl.records",
         "record.html.j2",
         source=Path(record.source).name,
         verdict=verdict(study),
-        rows=record_rows(study),
+        rows=record_rows(study, told),
         columns=[(t.quantity.replace("_", " "), t.column, t.unit or "") for t in record.taken],
         notes=study.notes,
         figures=figures,

@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.errors import InputError
 from drillctrl.base.files import write_text
+from drillctrl.base.language import Language
 from drillctrl.base.tableio import csv_text
 
 if TYPE_CHECKING:
@@ -17,22 +18,24 @@ if TYPE_CHECKING:
 _RPM = 30.0 / np.pi
 
 
-def save_bit(study: Findings, path: str | Path) -> None:
+def save_bit(study: Findings, path: str | Path, told: Language) -> None:
     """Write the bit's speed and torque over time; see `RecordStudy.save_bit`."""
     if Path(path).suffix.lower() != ".csv":
         raise InputError("path", str(path), "a file that ends in .csv")
     bit = study.bit
     if bit is None:
         raise InputError("path", str(path), "left out: the bit's speed is not known")
-    header = ["time [s]", "bit speed [rpm]", "bit torque [kN*m]"]
-    columns = [bit.time, _RPM * bit.speed, 1e-3 * bit.torque]
+    torque, scale = told.units["torque"]
+    unit = torque.replace("·", "*")
+    header = ["time [s]", "bit speed [rpm]", f"bit torque [{unit}]"]
+    columns = [bit.time, _RPM * bit.speed, scale * bit.torque]
     rows = (
         ["" if not np.isfinite(cell) else f"{cell:.6g}" for cell in row]
         for row in zip(*columns, strict=True)
     )
-    told = (
+    basis = (
         f"carried down from {study.record.source}; right to {bit.band:.3g} Hz, "
         f"standard errors by noise {_RPM * bit.speed_error:.3g} rpm "
-        f"and {1e-3 * bit.torque_error:.3g} kN*m"
+        f"and {scale * bit.torque_error:.3g} {unit}"
     )
-    write_text(path, csv_text(header, rows, [told]))
+    write_text(path, csv_text(header, rows, [basis]))

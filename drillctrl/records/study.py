@@ -9,6 +9,7 @@ import numpy as np
 
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.base.kinds import checks_kinds
+from drillctrl.base.language import told_language
 from drillctrl.base.text import finite_or_none
 from drillctrl.drilling.rig import Rig
 from drillctrl.records.downhole import (
@@ -85,26 +86,26 @@ class RecordStudy(Findings):
         Runs over speed and weight, of `with_computed_map`.
     """
 
-    def summary(self) -> str:
-        """Return what there is to say, in lines of a terminal."""
+    def summary(self, units: str | None = None) -> str:
+        """Return what there is to say, in lines of a terminal, in ``"si"`` or ``"field"`` units."""
         from drillctrl.records.words import record_summary
 
-        return record_summary(self)
+        return record_summary(self, told_language(units))
 
-    def plot(self) -> Figure:
+    def plot(self, units: str | None = None) -> Figure:
         """Draw it."""
         from drillctrl.records.overview import draw_study
 
-        return draw_study(self)
+        return draw_study(self, told_language(units))
 
-    def to_html(self) -> str:
+    def to_html(self, units: str | None = None) -> str:
         """Return one page that needs nothing else."""
         from drillctrl.records.page import record_page
 
-        return record_page(self)
+        return record_page(self, told_language(units))
 
-    def save_bit(self, path: str | Path) -> None:
-        """Write the bit's speed and torque over time, with those of the surface, to a CSV file.
+    def save_bit(self, path: str | Path, units: str | None = None) -> None:
+        """Write the bit's speed and torque over time to a CSV file.
 
         Raises
         ------
@@ -113,7 +114,7 @@ class RecordStudy(Findings):
         """
         from drillctrl.records.saving import save_bit
 
-        save_bit(self, path)
+        save_bit(self, path, told_language(units))
 
 
 @checks_kinds

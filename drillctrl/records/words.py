@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drillctrl.base.language import Language, Told
 from drillctrl.base.text import set_out, wrapped
 
 if TYPE_CHECKING:
@@ -17,23 +18,23 @@ _RPM = 30.0 / np.pi
 _FULL = 1.0
 
 
-def record_summary(study: Findings) -> str:
-    """Return a summary: the answer, then what it rests on."""
-    rows = [*record_rows(study), ("columns", ", ".join(columns_told(study)))]
+def record_summary(study: Findings, told: Language) -> str:
+    """Return a summary in units as told: the answer, then what it rests on."""
+    rows = [*record_rows(study, told), ("columns", ", ".join(columns_told(study)))]
     parts = [wrapped(verdict(study)), set_out(rows)]
     parts += [wrapped(f"note: {note}", 6) for note in study.notes]
     return "\n".join(parts)
 
 
-def record_rows(study: Findings) -> list[tuple[str, str]]:
+def record_rows(study: Findings, told: Language) -> list[tuple[str, str]]:
     """Return labels and what there is to say of each."""
     rows = [("swing", _swing(study)), ("period", _period(study)), ("modes", _modes(study))]
     if study.bit is not None:
         rows.append(("bit from surface", _bit(study)))
     if study.drive is not None:
-        rows.append(("drive", _drive(study)))
+        rows.append(("drive", _drive(study, told)))
     if study.fit is not None:
-        rows += _fit(study.fit)
+        rows += _fit(study.fit, told)
     if study.computed is not None:
         rows.append(("computed map", _computed(study)))
     record = study.record
@@ -107,7 +108,7 @@ def _bit(study: Findings) -> str:
     return told
 
 
-def _drive(study: Findings) -> str:
+def _drive(study: Findings, told: Language) -> str:
     seen = study.drive
     assert seen is not None
     span = f"from {seen.frequency[0]:.2g} to {seen.frequency[-1]:.2g} Hz"
@@ -116,7 +117,7 @@ def _drive(study: Findings) -> str:
     reflection = seen.reflection
     size = abs(complex(seen.impedance[place]))
     if reflection is None:
-        return f"impedance {size:.3g} N·m·s at {at}, seen {span}"
+        return f"impedance {told.text('impedance', size, 3)} at {at}, seen {span}"
     return f"returns {reflection[place]:.2f} of a wave at {at}, seen {span}"
 
 
@@ -140,15 +141,15 @@ def _first(study: Findings) -> float:
     return 1.0 / study.period.value if study.period is not None else 0.2
 
 
-def _fit(fit: RecordFit) -> list[tuple[str, str]]:
+def _fit(fit: RecordFit, told: Language) -> list[tuple[str, str]]:
     rows = [("fit", _fit_verdict(fit))]
-    rows.append(("  stiffness", _estimate(fit.stiffness, 1.0, "N·m/rad")))
-    rows.append(("  inertia", _estimate(fit.inertia, 1.0, "kg·m²")))
-    rows.append(("  damping", _estimate(fit.damping, 1.0, "1/s")))
+    rows.append(("  stiffness", _estimate(fit.stiffness, told.units["torsional_stiffness"])))
+    rows.append(("  inertia", _estimate(fit.inertia, told.units["inertia"])))
+    rows.append(("  damping", _estimate(fit.damping, told.units["rate"])))
     law = (
-        f"{_estimate(fit.level, 1e-3, 'kN·m')} of a fast bit, "
-        f"{_estimate(fit.drop, 1e-3, 'kN·m')} more of a slow one, "
-        f"over {_estimate(fit.decay, _RPM, 'rpm')}"
+        f"{_estimate(fit.level, told.units['torque'])} of a fast bit, "
+        f"{_estimate(fit.drop, told.units['torque'])} more of a slow one, "
+        f"over {_estimate(fit.decay, told.units['angular_rate'])}"
     )
     rows.append(("  bit's torque", law))
     rows.append(("  torque late by", f"{1e3 * fit.lag.value:.0f} ms"))
@@ -172,7 +173,8 @@ def _damped(mode: Peak) -> str:
     return f" ({100.0 * mode.damping_ratio:.1f} % damped)" if known else ""
 
 
-def _estimate(value: Estimate, factor: float, unit: str) -> str:
+def _estimate(value: Estimate, told: Told) -> str:
+    unit, factor = told
     if not value.relative < 2.0:
         return f"unknown ({unit})"
     if not value.known:

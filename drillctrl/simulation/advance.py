@@ -82,7 +82,9 @@ def _room(standing: March, march: ModuleType, duration: float) -> int:
     As many as the rest takes if it goes on as until now; what is not written to takes no memory.
     """
     used, reached = int(standing.ints[march.STEPS]), float(standing.reals[march.TIME])
-    foreseen = 1.1 * used * duration / max(reached, 1e-9)
+    # Steps of the past that it started from took none of that time.
+    made = used - standing.first
+    foreseen = standing.first + 1.1 * made * duration / max(reached, 1e-9)
     return int(min(max(2.0 * used, foreseen), _MOST_ROOM * used))
 
 

@@ -102,7 +102,8 @@ def plot_motion(run: Trace, inputs: Sequence[str] = (), title: str | None = None
         ax.set_ylabel(headline(ax.get_ylabel(), 24))
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
-        axes[0].legend(handles, labels, loc="upper left", fontsize="small")
+        # Curves and shading leave no corner free.
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
     axes[-1].set_xlabel(scale_of(run.case, "time").label)
     axes[0].set_title(headline(title or title_of(run), 80), fontsize="medium")
     return figure

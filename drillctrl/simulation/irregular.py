@@ -10,6 +10,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.linear import BIT_STATES
+from drillctrl.simulation.layout import longest_lag
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario
@@ -63,7 +64,7 @@ def _comes_apart(run: Simulation) -> bool:
     if controller is not None:
         controller = dataclasses.replace(controller, activation=0.0)
     begin = _turning(run, since, end)
-    past, size = run.past(begin), _sizes(run, since, end)
+    past, size = run.past(begin, kept=longest_lag(run.settings)), _sizes(run, since, end)
     instants = np.linspace(0.0, end - begin, _SAMPLES)
 
     def scaled(path: Simulation, times: FloatArray) -> FloatArray:
@@ -106,8 +107,19 @@ def _sizes(run: Simulation, since: float, until: float) -> FloatArray:
 
 def _lasts(run: Simulation, end: float) -> bool:
     """Whether the rates of the bit go on at the size that they have had."""
-    before, now = _sizes(run, 0.5 * end, 0.75 * end)[1::2], _sizes(run, 0.75 * end, end)[1::2]
+    before, now = _rates(run, end)
     return bool((abs(now - before) <= _LASTING * np.maximum(now, before)).all())
+
+
+def still_grows(run: Simulation) -> bool:
+    """Whether a rate of the bit is larger in the last quarter than in the one before by far."""
+    before, now = _rates(run, float(run.times[-1]))
+    return bool((now > (1.0 + _LASTING) * before).any())
+
+
+def _rates(run: Simulation, end: float) -> tuple[FloatArray, FloatArray]:
+    """Return the ranges of both rates in the third quarter and the last, (2,) each."""
+    return _sizes(run, 0.5 * end, 0.75 * end)[1::2], _sizes(run, 0.75 * end, end)[1::2]
 
 
 def _turning(run: Simulation, since: float, end: float) -> float:

@@ -372,6 +372,12 @@ def _stand_still(standing: March, structure: Structure, settings: data.Settings)
     return standing._replace(first=2)
 
 
+def longest_lag(settings: data.Settings) -> float:
+    """Return how far back constant delays look."""
+    model, sets = kernel("model"), range(len(settings.schedule))
+    return float(max(model.lag_of(settings, i, k) for i in range(3) for k in sets))
+
+
 def _look_back(
     standing: March,
     structure: Structure,
@@ -381,8 +387,7 @@ def _look_back(
 ) -> None:
     """Set the steps before t = 0, known for so long, at which constant delays look."""
     march, model, interpolate = (kernel(name) for name in ("march", "model", "interpolate"))
-    sets = range(len(settings.schedule))
-    longest = max(model.lag_of(settings, i, k) for i in range(3) for k in sets)
+    longest = longest_lag(settings)
     if longest > known:
         raise InputError("start", f"a past of {known:g}", f"one that is known for {longest:g}")
     for i in range(3):

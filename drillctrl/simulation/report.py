@@ -13,7 +13,7 @@ from drillctrl.base.text import set_out, wrapped
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.drive import CONSTANT_TORQUE, TopDrive
 from drillctrl.drilling.quantities import told_scale
-from drillctrl.simulation.irregular import irregular
+from drillctrl.simulation.irregular import irregular, still_grows
 from drillctrl.simulation.loads import loads
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.result import Simulation
@@ -89,6 +89,8 @@ def _outcome_text(run: Simulation) -> str:
         parts.append(f"which takes {_seconds(run, SHORTEST)} at least")
     if found.outcome is not Outcome.CHAOTIC and _irregular(run, found.outcome):
         parts.append("irregularly")
+    if found.outcome is Outcome.ORBIT and still_grows(run):
+        parts.append("still growing at the end")
     if found.swing is not None and found.outcome is not Outcome.SETTLES:
         parts.append(f"swing {found.swing:.3g}")
     if found.feed is not None and found.outcome is not Outcome.SETTLES:

@@ -18,6 +18,8 @@ from drillctrl.delay.system import DelaySystem
 _EXPONENT_LIMIT = 300.0
 # Below so many states a tighter bound, or another way to det Δ, saves nothing.
 _FEW_STATES, _SAFE_CONDITION = 20, 1e6
+# Of a power iteration: most steps, how near its bounds come to each other, and what stays positive.
+_POWERS, _CLOSE, _LEAST = 100, 1e-6, 1e-200
 # With fewer delayed signals to a state det Δ costs less through them.
 _THIN = 0.25
 _INVERSE_ITERATIONS = 3
@@ -148,9 +150,21 @@ def tight_bound(system: DelaySystem, right_of: float) -> float:
 
 
 def perron_root(matrix: FloatArray) -> float:
-    """Return the spectral radius of a nonnegative matrix, rounded outward."""
+    """Return the spectral radius of a nonnegative matrix, rounded outward.
+
+    Of many states it is bounded by the largest (M x)ᵢ/xᵢ (Collatz 1942), which is no less for any
+    x > 0; where the power iteration for x does not close in on it, eigenvalues are computed.
+    """
     # LAPACK scales what is beyond 1e138 or below 1e-138, and some builds do not scale back.
     size = float(matrix.max()) or 1.0
+    if len(matrix) >= _FEW_STATES:
+        x = np.ones(len(matrix))
+        for _ in range(_POWERS):
+            y = matrix @ x / size
+            ratios = y / x
+            if ratios.max() <= (1.0 + _CLOSE) * ratios.min():
+                return size * float(ratios.max()) * (1.0 + 1e-10) + 1e-300
+            x = y / (y.max() or 1.0) + _LEAST
     real, imag, _, _, info = dgeev(matrix / size, 0, 0)
     value = np.hypot(real, imag).max() if info == 0 else np.linalg.norm(matrix / size)
     value = size * float(value)

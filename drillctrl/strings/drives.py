@@ -97,13 +97,15 @@ class DriveComparison:
         language = told_language(units)
         return comparison_summary(self.rig, self.falling, self.drives, language)
 
-    def plot(self, name: str | None = None) -> Figure:
+    def plot(self, name: str | None = None, units: str = "si") -> Figure:
         """Draw ``|r|``, impedance, and damping over frequency; see `plot_drives`.
 
         Parameters
         ----------
         name : str, optional
             Of the rig, for the title.
+        units : {"si", "field"}
+            Of its length there.
         """
         from drillctrl.strings.drives_figure import plot_drives
 
@@ -111,7 +113,8 @@ class DriveComparison:
             drive.control.name: (drive.frequencies, drive.reflection, drive.impedance, drive.roots)
             for drive in self.drives
         }
-        length = f"{self.rig.string.length:.6g} m of string, free bit"
+        length = told_language(units).text("depth", self.rig.string.length, 6)
+        length += " of string, free bit"
         title = length if name is None else f"{name}, {length}"
         return plot_drives(curves, self.rig.string.torsion.wave_impedance, title)
 

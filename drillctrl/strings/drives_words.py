@@ -61,7 +61,7 @@ def comparison_summary(
         "",
         f"{language.text('depth', rig.string.length, 6)} of string, "
         f"{per * line.wave_impedance:.4g} {slope} of the uppermost pipe,",
-        drive_text(machine, language),
+        wrapped(drive_text(machine, language)),
         "Critical slope: by which the bit's torque may fall per unit of its speed.",
         f"Threshold: for a torque that falls by {drop} over {decay:.3g} rpm.",
         "",
@@ -105,12 +105,13 @@ def _advice(drives: Sequence[DriveMeasures], falling: FallingTorque, language: L
     )
     fall = language.text("torque", falling.drop, 3)
     stay = (
-        f"Stay above {_rpm(speed):.3g} rpm with it"
-        if speed > 0.0
+        f"Against stick-slip stay above {_rpm(speed):.3g} rpm with it"
+        if _rpm(speed) >= 1.0
         else "By this measure no speed is too low for it"
     )
     told += f" {stay}{f' ({beside})' if beside else ''}, if the bit's torque falls by {fall}"
-    return f"{told} as it turns faster (a guess: measure it)."
+    told += " as it turns faster (a guess: measure it)."
+    return f"{told} What grows along the string no drive reaches: analyze says whether any does."
 
 
 def threshold_speed(drive: DriveMeasures) -> float:
@@ -130,7 +131,7 @@ def _where(drive: DriveMeasures) -> str:
 
 def _damping(drive: DriveMeasures, i: int) -> str:
     root = drive.modes[i].root
-    return "absorbed" if root is None else f"{1e2 * root.damping_ratio:.3g}"
+    return "damped out" if root is None else f"{1e2 * root.damping_ratio:.3g}"
 
 
 def _margin(seconds: float) -> str:
@@ -172,7 +173,7 @@ def settings_text(control: DriveControl, language: Language = SI) -> str:
     """Return a law in one line: in the words of a drive, else its transfer functions in SI."""
     rows = drive_settings(control, language)
     if language is SI or rows[0][0] != "P":
-        return law_text(control)
+        return law_text(control, language)
     return ", ".join(f"{name} {value}" for name, value in rows)
 
 
@@ -185,15 +186,16 @@ def setting_sentence(control: DriveControl, language: Language) -> str:
     return f"Set {settings} of the drive ({control.name})."
 
 
-def law_text(control: DriveControl) -> str:
+def law_text(control: DriveControl, language: Language = SI) -> str:
     """Return a law in words: gains of PI control, else its transfer functions of s in 1/s."""
     integral, rest = without_integral(control.speed)
     told = []
     if len(rest.denominator) == 1 and len(rest.numerator) <= 2:
         gains = [part / rest.denominator[0] for part in rest.numerator]
-        told.append(f"Kp {gains[-1] / 1e3:.4g} kN·m·s/rad, Ki {integral / 1e3:.4g} kN·m/rad")
+        told.append(f"Kp {language.text('drive_impedance', gains[-1])}")
+        told.append(f"Ki {language.text('drive_stiffness', integral)}")
         if len(gains) == 2 and gains[0]:
-            told.append(f"inertia compensated {-gains[0]:.4g} kg·m²")
+            told.append(f"inertia compensated {language.text('inertia', -gains[0])}")
     else:
         told.append(f"on speed {_transfer_text(control.speed)} N·m·s/rad")
     if control.torque:

@@ -34,7 +34,9 @@ _WIDEST = 1.0
 _MOST_BYTES = 10_000_000
 _KINDS = {
     **{kind: kind for kind in KINDS},
-    **{"dp": "pipe", "drill pipe": "pipe", "hwdp": "heavy-weight", "dc": "collar"},
+    **dict.fromkeys(("dp", "drill pipe", "drillpipe"), "pipe"),
+    **dict.fromkeys(("hwdp", "heavy weight", "heavyweight"), "heavy-weight"),
+    **dict.fromkeys(("dc", "collars", "drill collar", "drill collars"), "collar"),
 }
 PARTS: dict[str, dict[str, Dimension | None]] = {
     "bit": {
@@ -70,6 +72,14 @@ _OPTIONAL = (
     *("torsional", "axial", "kelvin_voigt"),
     *("stiffness", "block_mass", "feed_gain"),
 )
+# What there is where nothing is known: docs/guide/drilling-engineers.md says how to find it.
+_USUAL = {
+    "wearflat_length": "1 mm",
+    "cutter_inclination": "0.6",
+    "friction_coefficient": "0.6",
+    "geometry": "1",
+    "contact_strength": "the rock's strength",
+}
 # Attributes of a rig, and what they are called in a file.
 _CALLED = {"bit_radius": "diameter", "bit_geometry": "geometry", "rock_strength": "strength"}
 # Numbers in the unit that the format names.
@@ -266,7 +276,9 @@ def _refuse_lacking(lacking: Iterable[str]) -> None:
     """Say all that is missing at once."""
     told = "; ".join(filter(None, lacking))
     if told:
-        raise InputError(told, "(missing)", "given")
+        usual = ", ".join(f"{key} {value}" for key, value in _USUAL.items() if key in told)
+        hint = f", where not known about {usual}" if usual else ""
+        raise InputError(told, "(missing)", f"given{hint}")
 
 
 def _each_section(rows: Iterable[tuple[str, Mapping[str, Any]]]) -> tuple[Section, ...]:

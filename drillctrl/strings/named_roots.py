@@ -90,7 +90,7 @@ class NamedRoot:
     def text(self, language: Language) -> str:
         """Return name, frequency, damping and critical slope."""
         ratio = self.damping_ratio
-        damped = "absorbed" if ratio is None else f"{1e2 * ratio:.3g} %"
+        damped = "damped out" if ratio is None else f"{1e2 * ratio:.3g} %"
         told = f"{self.mode.name}: {self.frequency:.4g} Hz, {damped}"
         if self.critical_slope is None:
             return told

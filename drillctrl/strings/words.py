@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drillctrl.base.language import FIELD, SI, Language
+from drillctrl.base.text import set_out
 from drillctrl.drilling.rig import STANDARD_GRAVITY, Rig
 from drillctrl.strings.check import Mode, RigCheck
 from drillctrl.strings.drive_control import DriveMachine
@@ -54,8 +55,7 @@ def rig_summary(found: RigCheck, language: Language = SI) -> str:
     ]  # fmt: skip
     for kind, modes in (("torsional", found.torsional), ("axial", found.axial)):
         lines += _mode_lines(kind, modes)
-    width = max(len(label) for label, _ in lines) + 2
-    return "\n".join(f"{label:<{width}}{text}".rstrip() for label, text in lines)
+    return set_out(lines)
 
 
 def wall_note(rig: Rig) -> str | None:

@@ -188,7 +188,9 @@ class Comparison:
         """Return the table and what better costs, for people."""
 
         pushed = ", ".join(f"{k} = {v:g}" for k, v in self.disturbance.items())
-        head = f"At {self._point_text()}; disturbance {pushed}; by {self.sort}"
+        plain = self.case.told_rig is not None and self.sort == "spectral_abscissa"
+        by = "growth" if plain else self.sort
+        head = f"At {self._point_text()}; disturbance {pushed}; by {by}"
         rows = [row.to_dict() for row in self.rows]
         return comparison_text(head, rows, self._gain_texts(), self.case)
 

@@ -125,7 +125,7 @@ def comparison_text(
     """
     table = [["", *headings(case)]]
     table += [[row["label"], *cells(row, case)] for row in rows]
-    lines = [wrapped(head), "", *_blocks(table)]
+    lines = [wrapped(_answer(rows)), wrapped(head), "", *_blocks(table)]
     for one in rows:
         if one["structure"] is not None:
             word = "designed" if one["designed"] else "given"
@@ -137,6 +137,21 @@ def comparison_text(
     lines.append("")
     lines.append(wrapped(legend(case)))
     return "\n".join(lines)
+
+
+def _answer(rows: Sequence[Fields]) -> str:
+    """Say first which of them to take."""
+    offered = [r for r in rows if r["structure"] is not None and r["recommended"] is not False]
+    if not offered:
+        return "None of these is offered: no control does as well here."
+    best = offered[0]
+    if best["stable"]:
+        return f"{best['label']} does best: with it small vibration dies away."
+    if best["recommended"] is None:
+        return f"{best['label']} does best, and does not keep small vibration from growing."
+    told = f"{best['label']} does best: small vibration grows, and in trials the bit swings on"
+    swing = best["largest_swing"]
+    return f"{told}, at most by {100.0 * swing:.2g} %." if swing else f"{told}."
 
 
 def _blocks(table: list[list[str]]) -> list[str]:

@@ -27,6 +27,7 @@ from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.starts import start_named
 from drillctrl.strings.check import check_rig
+from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_law import driven_plant
 from drillctrl.strings.drives import DRIVE_NAMES, DriveComparison, compare_drives
 from drillctrl.strings.rig import StringRig, lump
@@ -43,6 +44,9 @@ _RTOL = 1e-6
 _START, _START_OF_STRING = "kick", "stick"
 # Of the map: points across and up, and its range over the point.
 _COUNTS, _ACROSS, _UP = (7, 5), (0.5, 1.5), (0.25, 2.0)
+_COUNTS_OF_STRING = (5, 3)
+# Of runs of a lumped rig, units of time.
+_USUAL = 200.0
 _AT_BIT, _OF_DRIVE = "pd", "soft-torque"
 
 
@@ -107,7 +111,8 @@ def rig_report(
     date : str
         Of the report; the same input with the same date makes the same page.
     mapped : bool
-        Whether a vibration map around the point is made, where one takes less than a minute.
+        Whether a vibration map around the point is made; of a string of 3 km it takes a minute
+        of one core.
     executor : concurrent.futures.Executor, optional
         Works on runs side by side.
     progress, stage : callable, optional
@@ -152,6 +157,10 @@ def rig_report(
         for drive in drives.drives:
             case, controller = law_controller(where, drive.control)
             tasks.append(_Task(len(tasks), case, controller, drive.control.name, seconds))
+        if mapped:
+            at("map")
+            law = drives.drives[-1].control if len(drives.drives) > 1 else None
+            found = _map(where, law, executor, progress, _COUNTS_OF_STRING, seconds)
     else:
         simple: RigPoint = replace(where, rig=lump(rig))
         free = analyze(where)
@@ -242,11 +251,13 @@ def _course(task: _Task) -> tuple[int, Course]:
 
 def _map(
     where: RigPoint,
-    control: Controller | None,
+    control: Controller | DriveControl | None,
     executor: Executor | None,
     progress: Progress | None,
+    counts: tuple[int, int] = _COUNTS,
+    seconds: float | None = None,
 ) -> VibrationMap:
-    """Map what becomes of the bit around a point after a kick."""
+    """Map what becomes of the bit around a point after a kick, in so many seconds."""
     told = where.language
     speed = told.number("angular_rate", where.rotary_speed)
     rate = max(told.number("axial_rate", where.penetration_rate), 1.0)
@@ -255,9 +266,10 @@ def _map(
         ("speed", *(float(f"{speed * share:.2g}") for share in _ACROSS)),
         ("rop", *(float(f"{rate * share:.2g}") for share in _UP)),
         control,
-        counts=_COUNTS,
+        counts=counts,
         refine=0,
         starts=("kick",),
+        duration=_USUAL if seconds is None else seconds / where.rig.time_scale,
         executor=executor,
         progress=progress,
     )

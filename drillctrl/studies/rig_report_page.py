@@ -75,6 +75,10 @@ def _map(found: ReportValues) -> tuple[str | None, str]:
     if found.map is not None:
         drawn = found.map.plot(("outcome",), found.name)
         text = "What becomes of the bit after a kick, at other speeds and rates of penetration."
+        if found.drives is not None:
+            seconds = found.language.text("time", float(found.courses[0].times[-1]), 2)
+            text = f"{text[:-1]}: so far as {seconds} of simulated motion tell, at each of"
+            text += f" {len(found.map.nodes)} points."
         return embedded(restyled(drawn, _WHOLE, _TEXT)), text
     if found.drives is None:
         return None, ""
@@ -86,8 +90,7 @@ def _map(found: ReportValues) -> tuple[str | None, str]:
     text = (
         "Torsional vibration of the first modes dies away where the bit's torque falls by less than"
         " the edge says as it turns faster; above the edge it grows to stick-slip. Found with the"
-        " linear motion of string and drive; a map of simulated runs of a string this long takes"
-        " hours: drillctrl map makes it."
+        " linear motion of string and drive; drillctrl map simulates it."
     )
     return embedded(restyled(ax, _WHOLE, _TEXT)), text
 

@@ -12,6 +12,7 @@ from drillctrl.designs.result import Analysis, Design
 from drillctrl.drilling.point import RigPoint
 from drillctrl.drilling.steady import SteadyState
 from drillctrl.simulation.outcome import Figures
+from drillctrl.simulation.status import OUTCOME_NAMED
 from drillctrl.strings.check import RigCheck
 from drillctrl.strings.drives import DriveComparison
 from drillctrl.studies.vibration import VibrationMap
@@ -106,12 +107,25 @@ class ReportValues:
     def recommended(self) -> bool:
         """Whether a control is recommended: it was tried, and does no harm on the string."""
         if self.drives is not None:
-            return self.drives.drives[-1].verdict.recommended and self._does_no_harm
+            return self.drives.drives[-1].verdict.recommended and self._is_no_worse_moving
         design = self.design
-        return design is not None and design.recommended is True and self._does_no_harm
+        return design is not None and design.recommended is True and self.does_no_harm
 
     @property
-    def _does_no_harm(self) -> bool:
+    def _is_no_worse_moving(self) -> bool:
+        """Whether a bit that turns does no worse after a kick, nearest the point on the map."""
+        if self.map is None or self.map.controlled is None or self.map.marked is None:
+            return True
+        spans = [self.map.plane.x.span, self.map.plane.y.span]
+        distance = ((self.map.points - list(self.map.marked)) / spans) ** 2
+        here = int(distance.sum(axis=1).argmin())
+        both = self.map.uncontrolled, self.map.controlled
+        free, mine = (OUTCOME_NAMED[str(each.outcomes[here])].severity for each in both)
+        return mine <= free
+
+    @property
+    def does_no_harm(self) -> bool:
+        """Whether the run over time ends no worse with the control."""
         if len(self.courses) < 2:
             return True
         free, with_control = (course.figures.outcome.severity for course in self.courses[:2])

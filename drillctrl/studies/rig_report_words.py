@@ -72,7 +72,7 @@ def _of_drive(found: ReportValues) -> list[str]:
         reason = law.verdict.reason(found.language)
         return [f"Do not use {law.control.name} on this string: {reason}."]
     if not found.recommended:
-        return [f"Do not use {law.control.name} here: in the run the bit did worse with it."]
+        return [f"Do not use {law.control.name} here: after a kick the bit did worse with it."]
     told = [setting_sentence(law.control, found.language)]
     if law is not stiff:
         first = law.modes[0]
@@ -87,14 +87,16 @@ def _of_drive(found: ReportValues) -> list[str]:
         beside = f" ({texts[1]} with a stiff drive)" if law is not stiff else ""
         fall = found.language.text("torque", found.drives.falling.drop, 3)
         stay = (
-            f"Stay above {texts[0]} with it"
-            if speeds[0] > 0.0
+            f"Against stick-slip stay above {texts[0]} with it"
+            if speeds[0] * 30.0 / math.pi >= 1.0
             else "By this measure no speed is too low for it"
         )
         told.append(
             f"{stay}{beside}, if the bit's torque falls by {fall} as it"
             " turns faster (a guess: measure it)."
         )
+    if not found.does_no_harm:
+        told.append("Bring a bit that stands up to speed under the stiff drive.")
     return told
 
 
@@ -242,7 +244,11 @@ def checked(found: ReportValues) -> list[str]:
         )
     if found.map is not None:
         points = len(found.map.nodes)
-        told.append(f"The map is of such runs at {points} points, without control and with it.")
+        told.append(
+            f"The map is of simulated runs at {points} points, without control and with it."
+            if found.drives is None
+            else f"The map is of simulated runs at {points} points, under each law."
+        )
     if found.is_lumped:
         told.append(
             "Settings and map are of the string taken as one mass each way; the runs over time are"

@@ -187,16 +187,19 @@ def _coloured(
     largest = float(known.max(initial=low))
     top = max(largest if high is None else min(largest, high), low + 1e-3)
     picture = None
+    drawn = []
     for ax, field in zip(row, fields, strict=True):
         ax.set_facecolor(_BROKEN)
         picture = ax.pcolormesh(
             x, y, np.ma.masked_invalid(field.T), shading="nearest", cmap=colours, vmin=low, vmax=top
         )
         if low == 0.0:
-            _contours(ax, x, y, field, top)
-    row[0].figure.colorbar(
+            drawn += _contours(ax, x, y, field, top)
+    bar = row[0].figure.colorbar(
         picture, ax=list(row), label=label, extend="max" if largest > top else "neither"
     )
+    for contours in drawn:
+        bar.add_lines(contours, erase=False)
 
 
 def _change(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, name: str) -> None:
@@ -223,12 +226,17 @@ def _change(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, name: str
     ax.figure.colorbar(picture, ax=ax, label=label)
 
 
-def _contours(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, top: float) -> None:
-    """Draw thin lines of equal value, a quarter of the scale apart."""
-    levels = [share * top for share in (0.25, 0.5, 0.75)]
+def _contours(ax: Axes, x: FloatArray, y: FloatArray, field: FloatArray, top: float) -> list[Any]:
+    """Draw and return thin lines at round values within the scale, if there are any."""
+    from matplotlib.ticker import MaxNLocator
+
     known = field[np.isfinite(field)]
-    if known.size and known.min() < levels[-1] and known.max() > levels[0]:
-        ax.contour(x, y, np.ma.masked_invalid(field.T), levels=levels, colors=GREY, linewidths=0.5)
+    levels = [v for v in MaxNLocator(4).tick_values(0.0, top) if 0.0 < v < top]
+    levels = [v for v in levels if known.size and known.min() < v < known.max()]
+    if not levels:
+        return []
+    masked = np.ma.masked_invalid(field.T)
+    return [ax.contour(x, y, masked, levels=levels, colors=GREY, linewidths=0.7)]
 
 
 def _overlay(
@@ -274,6 +282,8 @@ def _legend(
         handles.append(Patch(facecolor=_BROKEN, label="not measured: the run broke off"))
     if edge:
         handles.append(Line2D([], [], color="black", label="edge of linear stability"))
+    if any(len(ax.collections) > 1 for ax in grid[int(outcomes) :].ravel()):
+        handles.append(Line2D([], [], color=GREY, lw=0.7, label="lines as on the colour bar"))
     if threshold:
         label = "torsion loses its damping, on the motion drilled with"
         handles.append(Line2D([], [], color=TORSION, linestyle="dashed", label=label))

@@ -78,7 +78,7 @@ def _points(found: MapValues) -> str:
     a, b = found.counts
     more = len(found.nodes) - a * b
     dense = f" and {more} where the outcome changes" if more else ""
-    return f"{a} × {b}{dense}, {found.elapsed_seconds:.0f} s"
+    return f"{a} × {b}{dense}, computed in {found.elapsed_seconds:.0f} s"
 
 
 def _calm(severity: Severity) -> int:

@@ -19,6 +19,7 @@ from drillctrl import (
     study_record,
     table1,
 )
+from drillctrl.base.units import TORQUE, to_si
 from drillctrl.records.peaks import spectral_modes
 from drillctrl.records.swings import period_of, quiet, sticking_share, swing_index
 from tests.records.other_rig import RPM, OtherRig, _march, recorded, write_csv
@@ -273,12 +274,31 @@ def test_command_line(sticking, tmp_path, capsys):
         (["--to", "1 s"], "part"), (["--out", "x.xyz"], "--out"), (["--fit", "f.toml"], "--fit"),
         (["--dates", "x"], "--dates"), (["--torque-of", "x"], "--torque-of"),
         (["--lag", "9 s"], "--lag"), (["--column", "torque=Q"], "torque"),
-        (["--torque-of", "drive"], "--torque-of"),
+        (["--torque-of", "drive"], "--torque-of"), (["--units", "x"], "--units"),
     ):  # fmt: skip
         code, out, err = run(["record", str(path), *arguments], capsys)
         assert (code, out) == (2, ""), arguments
         assert len(err.splitlines()) == 1
         assert word in err
+
+
+def test_field_units_are_those_of_the_other_route(sticking, tmp_path, capsys):
+    time, top, torque, _ = sticking
+    found = study_record(record_of(time, top, torque), rig_of(RIG, tmp_path), fit=False)
+    assert found.bit is not None
+    found.save_bit(tmp_path / "si.csv")
+    found.save_bit(tmp_path / "field.csv", "field")
+    (name, si), (other, field) = (
+        (lines[1].rsplit(",", 1)[1], float(lines[2000].rsplit(",", 1)[1]))
+        for lines in (
+            (tmp_path / f"{units}.csv").read_text().splitlines() for units in ("si", "field")
+        )
+    )
+    assert (name, other) == ("bit torque [kN*m]", "bit torque [kft*lbf]")
+    assert to_si("torque", f"{field} kft*lbf", TORQUE) == pytest.approx(1e3 * si, rel=1e-4)
+    labels = {ax.get_ylabel() for ax in found.plot("field").axes}
+    assert "torque, kft·lbf" in labels
+    assert not any("kN" in label for label in labels)
 
 
 def test_what_is_no_record_is_refused(sticking, tmp_path):

@@ -7,7 +7,9 @@ import pytest
 
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint, RigPoint
+from drillctrl.simulation import advance
 from drillctrl.simulation.controller import Controller
+from drillctrl.simulation.layout import resized
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.strings.presets import string_preset
@@ -106,6 +108,22 @@ def test_a_past_without_what_nothing_looks_at(point, kick):
         simulate(point, late, duration=1.0, scenario=Scenario(start=short))
     enough = run.past(kept=2.5)
     assert 2.5 <= enough.known < 6.0
+
+
+def test_room_is_made_for_what_a_run_adds_to_its_past(monkeypatch):
+    """A long past takes no time of the run: its steps foretell nothing."""
+    whole = simulate(POINT, duration=400.0, initial=KICK, rtol=1e-11)
+    assert whole.steps > 8192
+    rooms = []
+
+    def heard(history, room, used):
+        rooms.append(room)
+        return resized(history, room, used)
+
+    monkeypatch.setattr(advance, "resized", heard)
+    run = simulate(POINT, duration=200.0, scenario=Scenario(start=whole.past()), rtol=1e-11)
+    assert rooms
+    assert max(rooms) < 1.5 * (whole.steps + run.steps)
 
 
 def test_a_past_that_does_not_fit_is_refused():

@@ -131,3 +131,15 @@ def test_what_is_small_beside_other_parts_is_no_rounding():
         assert np.sort(np.abs(found)) / unit == pytest.approx([0.0] * 7 + [4.0], abs=1e-3)
     assert spectral_abscissa(system) / unit == pytest.approx(4.0, rel=1e-9)
     assert agreement.verdict(system, 1.0) == ("agrees", "")
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_many_states_are_bounded_as_their_eigenvalues_say(cyclic):
+    rng = np.random.default_rng(5)
+    matrix = rng.random((60, 60)) ** 8
+    if cyclic:
+        # No power iteration settles: eigenvalues decide.
+        matrix = np.roll(np.diag(rng.random(60) + 0.5), 1, axis=1)
+    exact = np.abs(np.linalg.eigvals(matrix)).max()
+    assert exact <= perron_root(matrix) <= (1.0 + 2e-6) * exact
+    assert perron_root(np.zeros((60, 60))) < 1e-200

@@ -167,4 +167,4 @@ def test_the_first_sentence_says_what_to_set_and_how_fast_to_turn():
     speed = max(mode.threshold_speed for mode in best.modes) * 30.0 / math.pi
     assert first.startswith("Set P to ")
     assert best.control.name in first
-    assert f"Stay above {speed:.3g} rpm with it" in first
+    assert f"stay above {speed:.3g} rpm with it" in first

@@ -135,6 +135,8 @@ def test_every_form_holds_every_row(at_f):
     assert [line["label"] for line in lines] == [one.label for one in at_f.rows]
     assert float(lines[0]["spectral_abscissa"]) == fields["rows"][0]["spectral_abscissa"]
     text = at_f.summary()
+    best = min(at_f.rows, key=lambda one: row(at_f, one.label)["spectral_abscissa"])
+    assert text.startswith(f"{best.label} does best: with it small vibration dies away.")
     assert all(one.label in text for one in at_f.rows)
     assert "stabilises the point, p does not" in " ".join(text.split())
 

@@ -91,7 +91,8 @@ def test_the_map_stands_on_it():
 def test_a_drive_is_set_by_its_rule(monkeypatch):
     rig = load_rig("vertical-3000")
     # The runs of a long string take half a minute and are tested with the simulator.
-    monkeypatch.setattr("drillctrl.studies.rig_report._MOST_SECONDS", 0.2)
+    monkeypatch.setattr("drillctrl.studies.rig_report._MOST_SECONDS", 1.0)
+    monkeypatch.setattr("drillctrl.studies.rig_report._COUNTS_OF_STRING", (2, 2))
     found = rig_report(RigPoint(rig, 120 * pi / 30, 10 / 3600))
     pipe = rig.string.torsion.wave_impedance
     omega = 2.0 * pi * found.check.torsional[0].frequency
@@ -99,7 +100,10 @@ def test_a_drive_is_set_by_its_rule(monkeypatch):
     first = found.summary().splitlines()[0]
     told = [float(text) for text in re.findall(r"[PI] to ([\d.]+) kN", first)]
     np.testing.assert_allclose(told, [P / 1e3, I / 1e3], rtol=5e-3)
-    assert "Top drive" in words(found.to_html())
+    page = words(found.to_html())
+    assert "Top drive" in page
+    assert "1 s of simulated motion tell, at each of 4 points" in page
+    assert (found.map.against.name, found.map.controller.name) == ("stiff", "soft-torque")
 
 
 def test_the_edge_is_where_the_torque_falls_as_steeply_as_the_drive_stands():
