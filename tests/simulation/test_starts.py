@@ -11,7 +11,7 @@ import pytest
 from drillctrl.base.errors import InputError
 from drillctrl.cli import main
 from drillctrl.drilling.case import as_case
-from drillctrl.drilling.motion import stuck_states
+from drillctrl.drilling.motion import kicked_states, stuck_states
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
 from drillctrl.simulation.controller import Controller
@@ -185,3 +185,18 @@ def test_a_kick_moves_a_string_with_its_bit(name):
         swings.append(float(np.abs(later).max()))
     assert 0.25 < swings[0] < 0.5
     assert swings[1] < 0.02
+
+
+def test_a_bit_that_its_string_cannot_follow_slowly_is_kicked_alone_and_told(caplog):
+    structure = structure_of(as_case(at(string_preset("paper-string"), 120.0, 10.0)))
+    arrays, n = structure.arrays, len(structure.state_names)
+    # A state that integrates the twist of the bit pushes a mode ever faster.
+    A = np.zeros((n + 1, n + 1))
+    A[:n, :n], A[n, 2] = arrays.A, 1.0
+    A[structure.state_names.index("dtheta1"), n] = 1.0
+    E = np.vstack([arrays.E, np.zeros((1, 2))])
+    names = (*structure.state_names, "grown")
+    kick = kicked_states(arrays._replace(A=A, E=E), names, 0.1, 0.5)
+    assert "the bit alone is kicked" in caplog.text
+    np.testing.assert_array_equal(kick[[1, 3]], [0.1, 0.5])
+    assert kick[names.index("dtheta1")] == 0.0
