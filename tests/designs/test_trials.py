@@ -265,6 +265,23 @@ def test_small_basin_is_said():
     assert "every start" not in verdict.reason
 
 
+def test_a_small_basin_at_the_limit_is_told_and_is_that_of_the_runs(best_c, run):
+    """α = −0.81; a limit of 0.05 is enough after a small disturbance, too little after a kick."""
+    assert best_c.spectral_abscissa < -0.8
+    assert best_c.tried(limit=0.05).verdict.reason.startswith(
+        "the motion settles from a small disturbance, but after a kick forward"
+    )
+    gains = ("--K1", repr(best_c.K1[0, 0].item()), "--K2", repr(best_c.K2[0, 0].item()))
+    for start, limit, ends in (
+        ("small", "0.05", "settles"),
+        ("kick", "0.05", "stick-slip"),
+        ("kick", "2", "settles"),
+    ):
+        options = ("--structure", "case1", *gains, "--limit", limit, "--start", start)
+        code, out = run("simulate", *options, "--duration", "600", "--json")
+        assert (code, json.loads(out)["outcome"]) == (0, ends)
+
+
 def test_what_settles_from_the_three_starts_and_not_from_rest_does_not_contradict_itself():
     verdict = judge([Trial(start, FINE, SWINGS) for start in STARTS], True)
     usual = "settles from a small disturbance and from kicks forward and back by half the speed"

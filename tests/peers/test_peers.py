@@ -147,3 +147,32 @@ def test_a_broken_coupling_of_dde_biftool():
     root = dominant_roots(neurons(0.0, 2.4183994947))[0]
     assert root.multiplicity == 2
     assert root.value == pytest.approx(1j * math.sqrt(3.0) / 2.0, abs=1e-6)
+
+
+def layers(a, c):
+    """Two layers of neurons at rest: DDE-BIFTOOL's demos/nmfm_demo, b = 2, d = 1.2."""
+    to_itself, across = -2.0 * a * np.eye(2), 1.2 * c * np.array([[0.0, 1.0], [1.0, 0.0]])
+    return DelaySystem(-np.eye(2), (to_itself, across), (12.7, 20.2))
+
+
+@pytest.mark.parametrize(
+    ("a", "c", "omegas", "digits"),
+    [
+        # Hopf points along the first branch, c = 15/29.
+        (0.3676281680, 15 / 29, [0.7234938546], 1e-10),
+        (0.3453112603, 15 / 29, [0.1826428346], 1e-10),
+        (0.2988605971, 15 / 29, [0.2710841446], 1e-10),
+        # On the two Hopf curves: a root at 0 beside the pair, two pairs, a change of kind.
+        (0.0037927481, 0.8396720010, [0.1485568996], 1e-7),
+        (0.0899922748, 0.7735178974, [0.1560058562, 0.2900084424], 1e-5),
+        (0.2566137217, 0.6210725697, [0.1722171486], 1e-6),
+        (0.0133327150, 0.8554382654, [0.2958015628], 1e-7),
+        (0.0900149247, 0.7736041399, [0.2900073517, 0.1560072608], 1e-5),
+        (0.2518504300, 0.5812203535, [0.2759107995], 1e-6),
+    ],
+)
+def test_two_layers_of_dde_biftool(a, c, omegas, digits):
+    """DDE-BIFTOOL, demos/nmfm_demo/html/nmfm_demo.html: what BR_BIFDET prints, to ten digits."""
+    found = np.array([root.value for root in characteristic_roots(layers(a, c), -0.05)])
+    for omega in omegas:
+        assert np.abs(found - 1j * omega).min() < digits
