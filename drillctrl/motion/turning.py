@@ -67,6 +67,7 @@ class Turned(Block):
             made, states=signals, inputs=(), outputs=signals, A=a, E=load, B=ca.SX(size, 0), T=top,
             C=ca.SX.eye(size), R=made.R[states, :], late=(), drag=ca.SX(0, 2),
             side_force=ca.SX(0, 0), side_rate=ca.SX(0, 1), side_torque=ca.SX(0, 1),
+            side_held=ca.SX(0, 1),
         )  # fmt: skip
 
 
