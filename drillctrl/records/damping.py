@@ -36,6 +36,8 @@ _ROUNDS, _LEAST_STANDING = (3, 2), 5.0
 _STILL, _ROUGH = 0.01, 0.01
 # Steps for slopes, and the longest of a round: of ln stiffness, inertia, damping; of the lag, s.
 _SMALL = np.array([1e-3, 1e-3, 1e-2, 1e-4])
+# Errors of what the fit knows before: of these and of damping next to nothing.
+_FIT = np.array([0.01, 0.015, 2.0, 0.02])
 _FAR = np.array([0.03, 0.03, 0.7, 0.03])
 
 
@@ -166,8 +168,11 @@ def _round(
     basis = np.linalg.qr(now[:, 1:])[0]
     slopes = slopes - basis @ (basis.T @ slopes)
     left = now[:, 0] - basis @ (basis.T @ now[:, 0])
-    inverse = np.linalg.pinv(slopes.T @ slopes, rcond=1e-14)
-    step = np.clip(-inverse @ (slopes.T @ left), -_FAR, _FAR)
+    # What the fit knows of stiffness, inertia and lag holds on.
+    known_before = 1.0 / _FIT**2
+    inverse = np.linalg.pinv(slopes.T @ slopes + np.diag(known_before), rcond=1e-14)
+    apart = place - np.array([0.0, 0.0, 0.0, carrier.lag])
+    step = np.clip(-inverse @ (slopes.T @ left + known_before * apart), -_FAR, _FAR)
     scores = np.array([a.T @ b for a, b in _pieces(slopes, left)])
     scores = scores - scores.mean(axis=0)
     spread = inverse @ (scores.T @ scores) @ inverse

@@ -44,7 +44,7 @@ _UNKNOWN = 10.0
 _TOGETHER, _TOGETHER_SINGLE = 0.4, 0.1
 # Standard errors of the method itself on recordings of known rigs, beside those of noise: of
 # logarithms, of the lag in s. A sharp corner of the law meets motion whose band ends.
-_METHOD = {"damping": 0.12, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
+_METHOD = {"damping": 0.15, "level": 0.04, "drop": 0.07, "decay": 0.08, "lag": 0.015}
 _STRING_METHOD = 0.008
 # Slope of a bit's torque that the form of its law misses, as a share of the drop over the range
 # of speeds: at the collars viscous damping does just the same as such a slope.
