@@ -65,7 +65,7 @@ def keep_option() -> Callable[[Command], Command]:
     )
 
 
-def _drilling(options: Mapping[str, Any]) -> Drilling | None:
+def _drilling(options: Mapping[str, Any], others: str = "") -> Drilling | None:
     """Return the objective of laws of a drive; None for the string alone.
 
     Raises
@@ -78,7 +78,7 @@ def _drilling(options: Mapping[str, Any]) -> Drilling | None:
     if options["objective"] is None:
         return None
     if options["objective"] != "drilling":
-        wanted = "drilling, or left out"
+        wanted = f"drilling{others}, or left out"
         raise InputError("--objective", options["objective"], wanted)
     given = {name: options.get(name) for name in ("kick", "modes")}
     known = {name: value for name, value in given.items() if value is not None}
@@ -145,7 +145,7 @@ def deliver_drive_design(
     """
     dynamic = structure.startswith("dynamic-")
     worst = point.get("objective") == "worst-case"
-    objective = None if worst else _drilling(point)
+    objective = None if worst else _drilling(point, " or worst-case")
     own = ("objective",) if worst else ("depth_error",) if dynamic else ()
     own = (*own, *(_DRILLING if objective else ()))
     _refuse_others(structure, (*_DESIGN_BEARS, *own))

@@ -134,8 +134,8 @@ def test_coordinates_do_not_matter(stick_slip):
     """With the twist between both inertias as a state the load acts on all rates."""
     other = with_collar(POINT, relative=True)
     assert (other.motion().E[:, 1] != 0.0).sum() == 2
-    kick = {"dtheta": -6.0, "dtwist": 6.0}
-    run = simulate(other, duration=60.0, initial=kick, rtol=1e-9)
+    kick = Scenario(initial={"dtheta": -6.0, "dtwist": 6.0}, alone=True)
+    run = simulate(other, duration=60.0, scenario=kick, rtol=1e-9)
     assert [e.name for e in run.events] == [e.name for e in stick_slip.events]
     times = np.linspace(0.0, 60.0, 600)
     one, two = run.at(times, ("theta", "twist", "phi")), stick_slip.at(times)
