@@ -72,8 +72,12 @@ def period_of(data: FloatArray, step: float, segments: list[slice]) -> Period | 
     known = np.isfinite(periods)
     if known.sum() < max(1.0, _SHARE * periods.size):
         return None
-    # A window in which something else swings is none of this swing.
-    periods[np.abs(periods / np.median(periods[known]) - 1.0) > _OTHER] = np.nan
+    # A window in which something else swings is none of this swing, which is that of most windows;
+    # of as many, the slower one, for a harmonic may pass for it.
+    seen = periods[known]
+    alike = (np.abs(seen[:, None] / seen - 1.0) <= _OTHER).sum(axis=1)
+    swing = seen[alike == alike.max()].max()
+    periods[np.abs(periods / swing - 1.0) > _OTHER] = np.nan
     known = np.isfinite(periods)
     drift = 0.0
     if known.sum() > 2:

@@ -237,6 +237,11 @@ def test_indices_and_periods_of_signals_in_closed_form():
     slowing = 10.0 + np.sin(2.0 * np.pi * 200.0 * np.log1p(time / 1400.0))
     drift = period_of(slowing, 0.05, whole).drift
     assert drift == pytest.approx(3600.0 / 200.0, rel=0.1)
+    # For half of the record its seventh harmonic is stronger than the swing.
+    late, tone = time >= 300.0, np.sin(2.0 * np.pi * 7.0 * time / 7.3)
+    parted = 10.0 + np.where(late, 4.0, 0.0) * np.sin(2.0 * np.pi * time / 7.3) + 2.0 * tone * ~late
+    halves = [slice(0, 6000), slice(6000, 12000)]
+    assert period_of(parted, 0.05, halves).value == pytest.approx(7.3, rel=2e-3)
     noise = np.random.default_rng(0).standard_normal(time.size)
     assert period_of(10.0 + noise, 0.05, whole) is None
     stands = np.where(time % 5.0 < 2.0, 0.0, 10.0)
