@@ -18,6 +18,9 @@ from drillctrl.spectrum.characteristic import magnitude_bound
 # each further box as much faster again as the second says.
 _FIRST, _FURTHER = 2.0, 4.0
 _HALVINGS, _SHRUNK = 30, 16.0
+# A chain of integrators without delay is as fast as its gains make it: below the first it has no
+# speed of its own, and the innermost box takes this share of what its bounds permit.
+_NO_SPEED, _OF_REACH = 1e-200, 1e-6
 
 
 def fastest(
@@ -84,6 +87,8 @@ def nested_boxes(
     """
     speed = natural_speed(system, feedback, line)
     reach = fastest(system, feedback, bound_of_entries(feedback), line)
+    if speed < _NO_SPEED:
+        speed = _OF_REACH * reach
     boxes: list[FeedbackStructure] = []
     # The gains that do least.
     centre = np.clip(0.0, feedback.lower, feedback.upper)
