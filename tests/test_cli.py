@@ -143,7 +143,6 @@ BAD = [
     (["analyze", "--nonsense"], "--nonsense"),
     (["simulate", "--duration", "1e12"], "duration = 1000000000000.0"),
     (["simulate", "--rtol", "-1"], "rtol = -1.0"),
-    (["analyze", "--omega0", "10", "--omega0", "11"], "--omega0 = given twice: must be given once"),
     (["map", "--x", ""], "--x = : must be of the form"),
     (["reproduce", "fig4", "--out", ""], "--out = : must be a folder"),
     (["compare", "--structures", ""], "--structures = : must be names"),

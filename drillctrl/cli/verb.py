@@ -68,17 +68,6 @@ class Verb(click.Command):
         if "rig" in names and "as_json" in names:
             self.params.insert(names.index("as_json"), _verbose_option())
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Refuse what is given twice where once is meant: the last need not be what counts."""
-        seen: set[click.Parameter] = set()
-        for parameter in self.make_parser(ctx).parse_args(args=list(args))[2]:
-            several = parameter.multiple if isinstance(parameter, click.Option) else True
-            flag = isinstance(parameter, click.Option) and parameter.is_flag
-            if parameter in seen and not several and not flag:
-                raise InputError(parameter.opts[0], "given twice", "given once")
-            seen.add(parameter)
-        return super().parse_args(ctx, args)
-
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
         flags = {parameter.name: parameter.opts[0] for parameter in self.params if parameter.name}
