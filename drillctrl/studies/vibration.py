@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 STARTS = ("small", "kick", "back")
 _MOST_POINTS = 200_000
+_ABOVE_ZERO = ("omega0", "delta0", "speed", "rop", "wob")
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +196,12 @@ def vibration_map(
     shape = fine_shape(sizes, refine)
     if shape[0] * shape[1] > _MOST_POINTS:
         raise InputError("refine", refine, f"such that there are at most {_MOST_POINTS} points")
+    for which, axis in (("x axis", plane.x), ("y axis", plane.y)):
+        if axis.low <= 0.0 and axis.name in _ABOVE_ZERO:
+            typed = f"{axis.name} from {axis.low:g} {axis.unit}".rstrip()
+            raise InputError(
+                which, typed, "from above 0: a bit that neither turns nor cuts is not run"
+            )
     law, other = as_closing(controller), held_against(as_closing(against), case)
     if surroundings and not isinstance(law, GainTable | DriveLaws):
         raise InputError("surroundings", dict(surroundings), "given with a table or a law only")

@@ -178,6 +178,7 @@ def test_the_verb_prints_what_the_function_finds(capsys, tmp_path):
         (("--x", "speed=50:180 rpm"), "speed"),
         (("--x", "omega0=4:20:1"), "--x or --y"),
         (("--x", "omega0=4:20:a"), "--x"),
+        (("--x", "omega0=0:20:3"), "x axis = omega0 from 0: must be from above 0"),
         (("--starts", "nudge"), "--starts"),
         (("--show", "torque"), "--show"),
         (("--out", "map.xls"), "--out"),
