@@ -126,6 +126,7 @@ def test_a_string_of_today_with_the_usual_damping():
     assert kp / ki < 60.0
 
 
+@pytest.mark.long
 def test_above_the_linear_threshold_nothing_grows(slowed):
     for run in slowed.values():
         quiet = run.swings[(run.speeds > 1.1 * run.linear)]

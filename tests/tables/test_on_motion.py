@@ -56,6 +56,7 @@ def test_nodes_are_vouched_for_by_runs(made):
     assert "1 of 2 pass trial runs" in text
 
 
+@pytest.mark.long
 def test_gains_between_nodes_do_no_harm(made):
     middle = made.grid.case(115.0 * math.pi / 30.0, 50.0 / 3600.0, 60e6)
     _, point = middle.physics("a test")
@@ -78,6 +79,7 @@ def test_gains_follow_the_point_across_a_cell(made):
     assert not crosses(task(-2.0 * made.gains), 1)
 
 
+@pytest.mark.long
 def test_a_file_keeps_what_was_found(made, tmp_path):
     path = tmp_path / "gains.json"
     save_table(made, path)
