@@ -27,6 +27,8 @@ _NEAR_CIRCLE = 1e-3
 _NEAR_AXIS = 1e-3
 # States times delayed signals up to which one eigenvalue problem costs less than a sweep.
 _LARGEST = 80
+# The same up to which one is solved where a sweep cannot tell crossings apart.
+_AT_MOST = 400
 # Numbers of all matrices that are taken at once.
 _AT_ONCE = 2_000_000
 
@@ -102,7 +104,18 @@ def _swept(
     A0: FloatArray, left: FloatArray, right: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return (loop, ω, φ) of loops with many states and signals."""
-    found = [critical_phases(*loop) for loop in zip(A0, left, right, strict=True)]
+
+    def of_loop(*loop: FloatArray) -> tuple[FloatArray, FloatArray]:
+        try:
+            return critical_phases(*loop)
+        except ArithmeticError:
+            # Slower by far, but nothing that runs along the axis misleads it.
+            if loop[1].size > _AT_MOST:
+                raise
+            _, omega, phase = _of_few_signals(*(each[None] for each in loop))
+            return omega, phase
+
+    found = [of_loop(*loop) for loop in zip(A0, left, right, strict=True)]
     rows = np.repeat(np.arange(len(found)), [omega.size for omega, _ in found])
     omega, phase = (np.concatenate(each) for each in zip(*found, strict=True))
     return rows, omega, phase

@@ -64,6 +64,22 @@ def test_response_over_frequency_and_eigenvalue_problem_agree():
     assert seen > 60
 
 
+def test_where_a_sweep_is_lost_the_eigenvalue_problem_answers(monkeypatch):
+    rng = np.random.default_rng(0)
+    now = rng.normal(size=(20, 20)) - 5.0 * np.eye(20)
+    left, right = rng.normal(size=(20, 5)), rng.normal(size=(5, 20))
+    swept = critical_points(now[None], left[None], right[None])
+
+    def lost(*_):
+        raise ArithmeticError
+
+    monkeypatch.setattr("drillctrl.spectrum.critical.critical_phases", lost)
+    solved = critical_points(now[None], left[None], right[None])
+    assert swept[1].size
+    for one, other in zip(swept, solved, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
 def test_a_branch_that_touches_the_axis_and_turns_back_is_not_stepped_over():
     # x' = −a x − b x(t − τ) with b a little above a: critical in a short range of phases only.
     now, late = np.diag([-1.0, -2.0, -3.0]), np.diag([-1.000001, -1.9, -2.9])
