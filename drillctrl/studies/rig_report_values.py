@@ -113,9 +113,12 @@ class ReportValues:
 
     @property
     def _is_no_worse_moving(self) -> bool:
-        """Whether a bit that turns does no worse after a kick, nearest the point on the map."""
+        """Whether a bit that turns does no worse after a kick, nearest the point on the map.
+
+        Without a map the run over time has to say so.
+        """
         if self.map is None or self.map.controlled is None or self.map.marked is None:
-            return True
+            return self.does_no_harm
         spans = [self.map.plane.x.span, self.map.plane.y.span]
         distance = ((self.map.points - list(self.map.marked)) / spans) ** 2
         here = int(distance.sum(axis=1).argmin())

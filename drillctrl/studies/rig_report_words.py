@@ -72,7 +72,7 @@ def _of_drive(found: ReportValues) -> list[str]:
         reason = law.verdict.reason(found.language)
         return [f"Do not use {law.control.name} on this string: {reason}."]
     if not found.recommended:
-        return [f"Do not use {law.control.name} here: after a kick the bit did worse with it."]
+        return [f"Do not use {law.control.name} here: in runs the bit did worse with it."]
     told = [setting_sentence(law.control, found.language)]
     if law is not stiff:
         first = law.modes[0]
