@@ -145,10 +145,14 @@ def _answer(rows: Sequence[Fields]) -> str:
     if not offered:
         return "None of these is offered: no control does as well here."
     best = offered[0]
+    if any(row["structure"] is None for row in rows[: rows.index(best)]):
+        return "No control does better here than any of these that is offered."
+    if best["recommended"] is None:
+        kept = "dies away" if best["stable"] else "GROWS"
+        told = f"{best['label']} does best: with it small vibration {kept}"
+        return f"{told}; it was not tried from several starts."
     if best["stable"]:
         return f"{best['label']} does best: with it small vibration dies away."
-    if best["recommended"] is None:
-        return f"{best['label']} does best, and does not keep small vibration from growing."
     told = f"{best['label']} does best: small vibration grows, and in trials the bit swings on"
     swing = best["largest_swing"]
     return f"{told}, at most by {100.0 * swing:.2g} %." if swing else f"{told}."

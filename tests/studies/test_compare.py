@@ -1,5 +1,6 @@
 import base64
 import csv
+import dataclasses
 import html.parser
 import io
 import json
@@ -136,9 +137,13 @@ def test_every_form_holds_every_row(at_f):
     assert float(lines[0]["spectral_abscissa"]) == fields["rows"][0]["spectral_abscissa"]
     text = at_f.summary()
     best = min(at_f.rows, key=lambda one: row(at_f, one.label)["spectral_abscissa"])
-    assert text.startswith(f"{best.label} does best: with it small vibration dies away.")
+    told = " ".join(text.split())
+    assert told.startswith(f"{best.label} does best: with it small vibration dies away; it was not")
     assert all(one.label in text for one in at_f.rows)
-    assert "stabilises the point, p does not" in " ".join(text.split())
+    assert "stabilises the point, p does not" in told
+    # Where no control comes first by what they are sorted by, nothing else is offered first.
+    turned = dataclasses.replace(at_f, rows=at_f.rows[::-1])
+    assert turned.summary().startswith("No control does better here")
 
 
 class _Page(html.parser.HTMLParser):
