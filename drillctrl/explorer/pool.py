@@ -68,6 +68,7 @@ class Pool:
         self._places = asyncio.Semaphore(most)
         self._long = asyncio.Semaphore(most_long)
         self._asked, self._waiting = 0, most + waiting
+        self._sketching: _Worker | None = None
 
     @property
     def processes(self) -> list[int]:
@@ -84,8 +85,10 @@ class Pool:
         self._all.append(worker)
         return worker
 
-    async def ask(self, question: str, tell: Tell, *, long: bool) -> str:
+    async def ask(self, question: str, tell: Tell, *, sketch: bool, long: bool) -> str:
         """Return the answer; where the caller is cancelled, the work ends with its process.
+
+        Sketches, which follow the hand, go to a worker that has built their rig already.
 
         Raises
         ------
@@ -100,12 +103,21 @@ class Pool:
                 if long:
                     await held.enter_async_context(self._long)
                 await held.enter_async_context(self._places)
-                return await self._answer(question, tell)
+                return await self._answer(self._taken(sketch), question, tell)
         finally:
             self._asked -= 1
 
-    async def _answer(self, question: str, tell: Tell) -> str:
-        worker = self._idle.pop() if self._idle else self._started()
+    def _taken(self, sketch: bool) -> _Worker:
+        if not self._idle:
+            self._idle.append(self._started())
+        wanted = [one for one in self._idle if (one is self._sketching) == sketch]
+        chosen = (wanted or self._idle)[-1]
+        self._idle.remove(chosen)
+        if sketch:
+            self._sketching = chosen
+        return chosen
+
+    async def _answer(self, worker: _Worker, question: str, tell: Tell) -> str:
         loop = asyncio.get_running_loop()
 
         def told(*what: Any) -> None:

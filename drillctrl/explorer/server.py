@@ -115,11 +115,13 @@ class _Ask(_Guarded):
             raise tornado.web.HTTPError(415)
         try:
             question = self.request.body.decode("utf-8")
-            view = json.loads(question)["view"]
-        except (ValueError, KeyError, TypeError, RecursionError):
+            asked = json.loads(question)
+            view, sketch = asked["view"], "rough" in (asked.get("options") or {})
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise tornado.web.HTTPError(400, reason="No question") from None
         self.set_header("Content-Type", "application/x-ndjson; charset=UTF-8")
-        self.work = asyncio.ensure_future(self.pool.ask(question, self._tell, long=view in _LONG))
+        work = self.pool.ask(question, self._tell, sketch=sketch, long=view in _LONG)
+        self.work = asyncio.ensure_future(work)
         try:
             answer = await self.work
         except InputError as error:

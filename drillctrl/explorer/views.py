@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from drillctrl.base.arrays import FloatArray
+from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_number
 from drillctrl.charts.chains import stable_strips
 from drillctrl.charts.chart import StabilityChart, chart
 from drillctrl.delay.closing import close_loop
+from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.design import analyze
 from drillctrl.drilling.quantities import root_scales
 from drillctrl.explorer.commands import command_line, python_text
@@ -29,7 +30,9 @@ Options = Mapping[str, Any]
 
 _MOST_ROOTS = 16
 _MOST_POINTS = 1200
-_MANY_STATES = 100
+_MANY_STATES, _RESONANCES = 50, 24
+# How far from 0 a Nyquist curve is drawn, and how far apart its points may be.
+_SEEN, _STEP = 3.0, 0.08
 _BESIDE = ("stiff", "soft-torque", "z-torque")
 _MODES = 3
 
@@ -108,9 +111,7 @@ def nyquist(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
     def broken(omega: FloatArray) -> Any:
         return loop_transfer(plant, structure, K1, K2, omega)
 
-    omega = frequency_grid(plant, response=broken)
-    omega = omega[:: max(1, omega.size // _MOST_POINTS)]
-    values = broken(omega)[0, 0]
+    omega, values = _drawn(plant, broken)
     keep = np.isfinite(values)
     values, omega = values[keep], omega[keep]
     turn, _, cycles = root_scales(asked.rig)[1]
@@ -132,6 +133,36 @@ def nyquist(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:
             modules=["numpy"],
         ),
     }
+
+
+def _drawn(
+    plant: DelaySystem, broken: Callable[[FloatArray], ComplexArray]
+) -> tuple[FloatArray, ComplexArray]:
+    """Return frequencies and values that draw a Nyquist curve.
+
+    Those of a string begin about its resonances, and come closer only where the curve is seen.
+    """
+    if plant.order < _MANY_STATES:
+        omega = frequency_grid(plant, response=broken)
+        omega = omega[:: max(1, omega.size // _MOST_POINTS)]
+        return omega, broken(omega)[0, 0]
+    poles = approximate_roots(plant)
+    poles = poles[poles.imag > 0.0]
+    poles = poles[np.argsort(poles.imag)][:_RESONANCES]
+    turned = np.tan(np.radians(np.linspace(-80.0, 80.0, 7)))
+    near = poles.imag[:, None] + abs(poles.real)[:, None] * turned
+    between = np.geomspace(1e-2, 1e3, 200) * poles.imag[0]
+    omega = np.union1d(between, near[near > 0.0])
+    values = broken(omega)[0, 0]
+    while omega.size < _MOST_POINTS:
+        seen = np.minimum(abs(values[1:]), abs(values[:-1])) < _SEEN
+        coarse = np.flatnonzero(seen & (abs(np.diff(values)) > _STEP))
+        if not coarse.size:
+            break
+        middle = np.sqrt(omega[coarse] * omega[coarse + 1])
+        values = np.insert(values, coarse + 1, broken(middle)[0, 0])
+        omega = np.insert(omega, coarse + 1, middle)
+    return omega, values
 
 
 def reflection(asked: Asked, options: Options, tell: Tell) -> dict[str, Any]:

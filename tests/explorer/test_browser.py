@@ -8,6 +8,7 @@ import time
 import pytest
 
 from drillctrl import RigPoint, analyze, simulate, table1
+from tests.explorer.rigs import LUMPED
 
 pytest.importorskip("tornado")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -35,22 +36,6 @@ geometry = 1.0
 [rock]
 strength = "60 MPa"
 contact_strength = "60 MPa"
-"""
-LUMPED = """\
-mass = "40 t"
-inertia = "120 kg*m^2"
-axial_stiffness = "700 kN/m"
-torsional_stiffness = "938 N*m/rad"
-axial_damping = "15.6 kN*s/m"
-torsional_damping = "32.9 N*m*s/rad"
-rock_strength = "60 MPa"
-contact_strength = "60 MPa"
-bit_radius = "108 mm"
-wearflat_length = "1.2 mm"
-cutter_inclination = 0.6
-friction_coefficient = 0.6
-bit_geometry = 1.0
-submerged_weight = "330 kN"
 """
 # A map of hours, so that it is surely still at work when it is cancelled.
 HOURS = "40"
@@ -80,15 +65,7 @@ def window(browser, server):
         page.set_default_timeout(60_000)
         page.on("console", lambda message: heard.append(message.text))
         page.on("pageerror", lambda error: heard.append(str(error)))
-        own = server.address.split("?")[0]
-        page.on(
-            "request",
-            lambda request: (
-                None
-                if request.url.startswith((own, "data:", "blob:"))
-                else heard.append(request.url)
-            ),
-        )
+        page.on("request", lambda request: heard.extend(foreign(request.url)))
         page.goto(server.address)
         page.wait_for_selector("#panel-chart svg")
         page.wait_for_selector("#panel-motion svg")
@@ -258,6 +235,30 @@ def test_gains_are_moved_and_found_within_bounds(page):
     page.keyboard.press("ArrowRight")
     page.select_option("#structure", "")
     page.wait_for_selector("#panel-nyquist", state="hidden")
+
+
+def test_a_search_for_gains_is_cancelled(page):
+    """What was set stays; no worker goes on, and the next search finds."""
+    page.select_option("#structure", "case2")
+    page.locator("#search").evaluate("e => { e.open = true; }")
+    type_in(page, "#gain-K1_1", "-1234")
+    page.check("#trials")
+    page.click("#find")
+    page.wait_for_selector("#find-progress:not([hidden])")
+    assert page.is_disabled("#find")
+    page.focus("#find-cancel")
+    page.keyboard.press("Enter")
+    until(page, "document.querySelector('#found').textContent === 'Cancelled.'")
+    assert page.is_enabled("#find")
+    assert page.evaluate("document.activeElement.id") == "find"
+    assert page.is_hidden("#find-cancel")
+    assert page.is_hidden("#find-progress")
+    assert page.input_value("#gain-K1_1") == "-1234"
+    page.uncheck("#trials")
+    page.select_option("#structure", "p")
+    page.click("#find")
+    until(page, "document.querySelector('#found').textContent.includes('drillctrl design')")
+    page.select_option("#structure", "")
 
 
 def test_axes_of_the_chart_are_set(page):

@@ -3,18 +3,22 @@
 import contextlib
 import http.client
 import json
+import math
 import re
 import socket
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 import drillctrl
-from drillctrl import InputError
+from drillctrl import InputError, RigPoint, analyze
+from tests.explorer.rigs import LUMPED
 
 pytest.importorskip("tornado")
 
+from drillctrl.explorer.rig_text import rig_from_text
 from drillctrl.explorer.server import ASSETS, LARGEST, bound
 
 PAGE = Path(drillctrl.__file__).parent / "explorer" / "page"
@@ -174,6 +178,19 @@ def test_no_window_sees_the_rig_of_another(server):
     found = server.ask("describe", {"rig": {"name": "mine.toml", "text": None}})
     assert "one of table1" in found["error"]
     assert "secret" not in json.dumps(server.ask("describe", STATE))
+
+
+def test_two_users_with_rigs_of_one_name_get_their_own_answers(server):
+    """Both ask at once and again, so that workers and what they remember are shared."""
+    rigs = [{"name": "mine.toml", "text": LUMPED.replace("40 t", m)} for m in ("30 t", "60 t")]
+    states = [{**STATE, "rig": rig, "units": "si"} for rig in rigs] * 2
+    with ThreadPoolExecutor(2) as users:
+        heard = list(users.map(lambda state: server.ask("roots", state)["result"], states))
+    points = [RigPoint(rig_from_text(rig["text"], "x"), 4 * math.pi, 20 / 3600) for rig in rigs]
+    wanted = [analyze(point).spectral_abscissa for point in points]
+    assert wanted[0] != pytest.approx(wanted[1], rel=1e-3)
+    for k, found in enumerate(heard):
+        assert found["data"]["spectral_abscissa"] == pytest.approx(wanted[k % 2], rel=1e-9)
 
 
 def test_a_port_that_is_taken_is_named(server):

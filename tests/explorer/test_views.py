@@ -17,6 +17,7 @@ from drillctrl import (
     design,
     drive_control,
     driven_plant,
+    loop_transfer,
     plant_system,
     preset_structure,
     simulate_starts,
@@ -161,6 +162,20 @@ def test_nyquist_is_the_ratio_of_the_two_determinants():
         found["frequency"][0], found["omega"][0] / RIG.time_scale / 2 / math.pi
     )
     assert run(found["python"])["L"].shape == (1000,)
+
+
+def test_nyquist_of_a_string_misses_no_resonance():
+    """No frequency of thousands comes nearer to −1, and where it is seen it has no gaps."""
+    state = {"rig": {"name": "paper-string", "text": None}, "speed": 120.0, "rop": 20.0,
+             "structure": "case2", "K1": [3.0, 50.0], "K2": [0.0, 0.0]}  # fmt: skip
+    found, _ = ask("nyquist", state)
+    asked = read_asked(state)
+    plant = asked.case.system(asked.structure.inputs)
+    omega = np.geomspace(found["omega"][0], found["omega"][-1], 6000)
+    dense = np.abs(1.0 + loop_transfer(plant, *asked.feedback, omega)).min()
+    assert found["distance"] < 1.001 * dense
+    drawn = np.array(found["real"]) + 1j * np.array(found["imag"])
+    assert np.abs(np.diff(drawn)).max() < 0.1
 
 
 def test_reflection_is_that_of_a_wave_at_an_impedance():

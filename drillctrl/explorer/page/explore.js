@@ -414,6 +414,7 @@ function drawMotion(result) {
 const motionOptions = () => ({ duration: Number(motionLength.input.value), start: motionStart.input.value });
 const runMotion = new Job(panels.motion, "simulate", motionJob.go, motionJob.cancel, motionJob.bar);
 motionJob.go.addEventListener("click", () => {
+  clearTimeout(still);
   follow.motion.halt();
   runMotion.run(motionOptions(), drawMotion);
 });
@@ -569,11 +570,15 @@ const follow = {
   }),
 };
 // The point rests: what was sketched is sharpened, counted and certified.
-let checkedOf = "", resting = 0;
+let checkedOf = "", resting = 0, still = 0;
 function checkSoon() {
   clearTimeout(resting);
   panels.roots.busy("checking …", follow.checked);
-  resting = setTimeout(() => follow.checked.poke(), 250);
+  resting = setTimeout(rested, 250);
+}
+function rested() {
+  follow.checked.poke();
+  if (!panels.nyquist.section.hidden) follow.nyquist.poke();
 }
 async function askFree() {
   free = false;
@@ -590,13 +595,16 @@ function changedPoint() {
   const now = JSON.stringify(question());
   if (now === lastPoint) return;
   lastPoint = now;
+  clearTimeout(resting);
+  panels.roots.busy("", follow.checked);
   follow.roots.poke();
   const atBit = state.structure !== null && !known.drive;
   panels.nyquist.section.hidden = !atBit;
-  panels.reflection.section.hidden = !known.drive;
-  if (atBit) follow.nyquist.poke();
-  if (known.drive) follow.reflection.poke();
-  if (followsMotion()) follow.motion.poke();
+  // Of a string of pipe it takes longer than a drag, too.
+  if (atBit && known.lumped) follow.nyquist.poke();
+  // A run takes longer than a step of the hand: it waits until the hand does.
+  clearTimeout(still);
+  if (followsMotion()) still = setTimeout(() => follow.motion.poke(), 120);
   else panels.motion.clear("A string of pipe takes a while: start the simulation.");
 }
 // Rig, rock or gains: the chart is another one too.
@@ -605,6 +613,8 @@ function changedLoop() {
   if (key !== freeFor) { free = null; freeFor = key; }
   changedPoint();
   follow.chart.poke();
+  panels.reflection.section.hidden = !known.drive;
+  if (known.drive) follow.reflection.poke();
 }
 
 (async () => {
