@@ -22,6 +22,7 @@ from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.run import checked_run
 from drillctrl.simulation.starts import possible_starts, start_named
 from drillctrl.simulation.status import OUTCOME_NAMED, Outcome
+from drillctrl.strings.changed import string_of
 from drillctrl.strings.drive_control import DriveControl
 from drillctrl.strings.drive_laws import DriveLaws
 from drillctrl.studies.lattice import Node, explore, fine_shape
@@ -41,7 +42,7 @@ from drillctrl.studies.vibration_point import (
     measure_point,
 )
 from drillctrl.studies.vibration_text import closing_text, map_summary, place_text
-from drillctrl.studies.vibration_threshold import check_threshold, torsional_field
+from drillctrl.studies.vibration_threshold import torsional_field, without_drive
 from drillctrl.studies.vibration_values import MapValues, Severity
 from drillctrl.tables.gain_table import GainTable
 
@@ -169,7 +170,7 @@ def vibration_map(
         Of each run, dimensionless.
     threshold : bool
         Whether to look as well where torsion has damping left on the axial orbit that is drilled
-        with; see `torsional_threshold`. Not for strings under a top drive.
+        with; see `torsional_threshold`. Of a string under a top drive it is that of its laws.
     mark : bool
         Whether the operating point is marked, where it lies on the map.
     surroundings : mapping, optional
@@ -226,8 +227,6 @@ def vibration_map(
             cases[node] = closed(*value.tolist())
         return cases[node]
 
-    if threshold:
-        check_threshold(case)
     names = _checked_starts(starts, closed_node((0, 0))[-1][0])
     # What cannot be simulated at a corner is refused before anything is.
     for node in ((0, 0), (shape[0] - 1, shape[1] - 1)):
@@ -260,7 +259,12 @@ def vibration_map(
     field = None
     if threshold:
 
-        def torsion(x: float, y: float) -> tuple[Case, tuple[Controller | None, ...]]:
+        def torsion(x: float, y: float) -> Any:
+            where = plane.rig_point_at(x, y)
+            if where is not None and all(isinstance(each, DriveLaws) for each in columns):
+                depth = string_of(where.rig).length
+                laws = [each.at(depth) for each in columns if isinstance(each, DriveLaws)]
+                return without_drive(where, case.physics("a map")[0].bit), tuple(laws)
             pairs = closed(x, y)
             return pairs[0][0], tuple(closing for _, closing in pairs)
 

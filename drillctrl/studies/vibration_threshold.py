@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
-from drillctrl.base.errors import InputError
 from drillctrl.base.workers import Progress
 from drillctrl.charts.plane import Plane
 from drillctrl.delay.closing import close_loop
 from drillctrl.delay.structure import FeedbackStructure
-from drillctrl.drilling.case import Case
+from drillctrl.drilling.bit_rock import BitRock
+from drillctrl.drilling.case import Case, as_case
+from drillctrl.drilling.plant import paper_plant
+from drillctrl.drilling.point import RigPoint
 from drillctrl.motion.loop import torsional_system
-from drillctrl.motion.response import FEWEST_PERIODS
+from drillctrl.motion.response import FEWEST_PERIODS, BitResponse, bit_response
 from drillctrl.motion.swing import ModeAt, mode_at
 from drillctrl.motion.torsion import torsional_modes
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.status import Outcome
 from drillctrl.spectrum.roots import spectral_abscissa
+from drillctrl.strings.drive_control import DriveControl
+from drillctrl.strings.line import Line
 from drillctrl.strings.rig import StringRig
+from drillctrl.strings.slopes import bit_impedance, mode_slopes
 from drillctrl.studies.tasks import run_tasks, task_key
 from drillctrl.studies.vibration_point import FEW_STATES
 
@@ -37,6 +42,8 @@ if TYPE_CHECKING:
 _MOST, _MOST_OF_STRING = (13, 9), (7, 5)
 SWING = 0.03
 TORSION = "#7A0177"
+# Modes that are followed under a law of a drive, and steps of theirs and of Newton's method.
+_MODES, _STEPS, _NEWTON = 4, 13, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,25 +76,30 @@ class TorsionalField:
 class _Task:
     index: int
     case: Case
-    controllers: tuple[Controller | None, ...]
+    closings: tuple[Controller | DriveControl | None, ...]
 
     @property
     def key(self) -> str:
-        keys = [task_key(self.case, each, "threshold", SWING) for each in self.controllers]
+        keys = [
+            task_key(self.case, None, "threshold", SWING, repr(each))
+            if isinstance(each, DriveControl)
+            else task_key(self.case, each, "threshold", SWING)
+            for each in self.closings
+        ]
         return "-".join(keys)
 
 
-def check_threshold(case: Case) -> None:
-    """Raise `InputError` if a top drive turns the string: its own motion is not looked at."""
-    if isinstance(case.rig, StringRig) and case.rig.drive is not None:
-        wanted = "left out for a string under a top drive, whose own motion is not in it"
-        raise InputError("threshold", "asked for", wanted)
+def without_drive(where: RigPoint, bit: BitRock) -> Case:
+    """Return a string whose bit is turned as it drills, whatever its top drive does."""
+    assert isinstance(where.rig, StringRig)
+    rig = replace(where.rig, drive=None)
+    return as_case(replace(where, rig=rig), paper_plant(bit, **rig.hardware()))
 
 
 def torsional_field(
     plane: Plane,
     counts: tuple[int, int],
-    closed: Callable[[float, float], tuple[Case, tuple[Controller | None, ...]]],
+    closed: Callable[[float, float], tuple[Case, tuple[Controller | DriveControl | None, ...]]],
     executor: Executor | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Progress | None = None,
@@ -101,14 +113,16 @@ def torsional_field(
     counts : (int, int)
         Points of the map across and up; fewer are looked at where these are many.
     closed : callable
-        Returns the plant at a place, and what closes its loop in each column.
+        Returns the plant at a place, that of `without_drive` where laws of a drive turn it, and
+        what closes its loop in each column.
     executor, checkpoint, progress
         As in `vibration_map`.
 
     Notes
     -----
     The answer H of the bit is that of its axial orbit, which torque hardly changes: one for all
-    columns (`bit_response`). Torsion with that answer and the gains is linear.
+    columns (`bit_response`). Torsion with that answer and the gains or the law is linear. Of a
+    string H takes about 20 s of processor at each place, of which there are at most 35.
     """
     plant, _ = plane.case.physics("a threshold")
     most = _MOST if len(plant.state_names) <= FEW_STATES else _MOST_OF_STRING
@@ -135,20 +149,76 @@ def _number(value: float | str | None) -> float:
 
 def _grown(task: _Task) -> dict[str, Any]:
     """Return the growth of each column; 'inf' where the bit swings of itself, None unknown."""
-    entry: dict[str, Any] = {"index": task.index, "growth": [None] * len(task.controllers)}
+    entry: dict[str, Any] = {"index": task.index, "growth": [None] * len(task.closings)}
     _, point = task.case.physics("a threshold")
     if not point.delta0 > 0.0:
         return entry
+    laws = [each for each in task.closings if isinstance(each, DriveControl)]
+    if laws:
+        entry["growth"] = _under_laws(task.case, laws)
+        return entry
     at = mode_at(task.case, torsional_modes(task.case)[0], SWING, most_periods=FEWEST_PERIODS)
-    entry["growth"] = [_growth(task.case, each, at) for each in task.controllers]
+    entry["growth"] = [
+        None if isinstance(each, DriveControl) else _growth(task.case, each, at)
+        for each in task.closings
+    ]
     return entry
+
+
+def _under_laws(case: Case, laws: Sequence[DriveControl]) -> list[float | str | None]:
+    rig = case.rig
+    assert isinstance(rig, StringRig)
+    line, time = rig.string.torsion, rig.time_scale
+    (first,) = mode_slopes(line, laws[0], 1)
+    turned = 2.0 * math.pi * first.mode_frequency * time
+    found = bit_response(case, turned, SWING, most_periods=FEWEST_PERIODS)
+    if not math.isfinite(found.error):
+        return [_unknown(found)] * len(laws)
+    answer = found.value * rig.torsional_stiffness * time
+    return [time * law_growth(line, law, answer) for law in laws]
+
+
+def law_growth(line: Line, law: DriveControl, answer: complex) -> float:
+    """Return how fast torsion grows under a law where the bit answers with H, 1/s.
+
+    Parameters
+    ----------
+    line : Line
+        The string in torsion.
+    law : DriveControl
+        Of its drive.
+    answer : complex
+        H, torque per speed of the bit, N m s/rad.
+
+    Returns
+    -------
+    float
+        The largest of the first modes; NaN where none could be followed.
+
+    Notes
+    -----
+    The roots of Z(s) + H = 0, with Z the impedance that string and drive show the bit, are
+    followed from the critical slopes, at which they lie on the imaginary axis.
+    """
+    rates = [-math.inf]
+    for mode in mode_slopes(line, law, _MODES):
+        if mode.frequency is None:
+            continue
+        s = 2j * math.pi * mode.frequency
+        for wanted in np.linspace(mode.slope, -answer, _STEPS):
+            for _ in range(_NEWTON):
+                near = 1e-6 * abs(s)
+                here, there = (complex(bit_impedance(line, law, at)) for at in (s, s + near))
+                s -= (here - wanted) * near / (there - here)
+        rates.append(s.real)
+    known = max(rates)
+    return known if math.isfinite(known) else math.nan
 
 
 def _growth(case: Case, controller: Controller | None, at: ModeAt) -> float | str | None:
     response = at.response
     if not math.isfinite(at.error):
-        unstable = response.broken in (None, Outcome.DIVERGES)
-        return "inf" if unstable else None
+        return _unknown(response)
     if controller is None:
         return at.root.real
     feedback = controller.feedback
@@ -157,6 +227,10 @@ def _growth(case: Case, controller: Controller | None, at: ModeAt) -> float | st
     system = torsional_system(case, response.value, response.frequency, feedback.inputs)
     _, point = case.physics("a threshold")
     return spectral_abscissa(close_loop(system, feedback, K1[0], K2[0], delay=point.delay))
+
+
+def _unknown(response: BitResponse) -> str | None:
+    return "inf" if response.broken in (None, Outcome.DIVERGES) else None
 
 
 def draw_threshold(ax: Axes, found: TorsionalField, growth: FloatArray) -> None:

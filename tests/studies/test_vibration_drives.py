@@ -21,6 +21,7 @@ from drillctrl import (
     changed_rig,
     drive_control,
     drive_table,
+    driven_plant,
     law_controller,
     load_laws,
     simulate,
@@ -32,11 +33,15 @@ from drillctrl import (
 )
 from drillctrl.charts.plane import make_plane
 from drillctrl.cli import main
+from drillctrl.drilling.friction import FreeBit
 from drillctrl.motion.response import BitResponse
 from drillctrl.motion.swing import ModeAt
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.starts import start_named
-from drillctrl.studies.vibration_threshold import torsional_field
+from drillctrl.spectrum.pseudospectral import approximate_roots
+from drillctrl.strings.named_roots import named_roots
+from drillctrl.strings.slopes import mode_slopes
+from drillctrl.studies.vibration_threshold import law_growth, torsional_field
 
 STRING = DrillString(
     (
@@ -162,9 +167,55 @@ def test_torsion_loses_its_damping_where_the_threshold_along_speed_has_it():
     assert found.to_dict()["threshold"]["grows"][0][0] == [True, True]
 
 
-def test_a_string_under_a_drive_has_no_threshold():
-    with pytest.raises(InputError, match="threshold"):
-        vibration_map(POINT, SPEED, ROP, threshold=True, **QUICK)
+@pytest.fixture
+def answering(monkeypatch):
+    """Return what lets the bit answer at once with a share of an impedance, N m s/rad."""
+
+    def let(answer):
+        unit = RIG.torsional_stiffness * RIG.time_scale
+        none = np.zeros(0, complex)
+
+        def answered(case, frequency, swing, **options):
+            assert case.rig.drive is None
+            return BitResponse(frequency, swing, answer / unit, 0.0, none, none, 1.0, 1.0, 0, 0, 1)
+
+        monkeypatch.setattr("drillctrl.studies.vibration_threshold.bit_response", answered)
+
+    return let
+
+
+@pytest.mark.parametrize("law", ["stiff", "soft-torque", "z-torque"])
+def test_torsion_under_a_law_grows_as_its_roots_and_critical_slopes_say(law):
+    """A free bit has the roots of the string; one that falls by a critical slope has none left."""
+    control, line = drive_control(law, RIG), STRING.torsion
+    slopes = [mode for mode in mode_slopes(line, control, 4) if mode.frequency is not None]
+    weakest = min(slope.slope for slope in slopes)
+    assert law_growth(line, control, -weakest) == pytest.approx(0.0, abs=1e-6)
+    assert law_growth(line, control, -1.05 * weakest) > 0.0 > law_growth(line, control, 0.0)
+    # The same roots of a string of finite elements, and the first of them by name.
+    free, grown = (
+        as_case(POINT, driven_plant(RIG, control, FreeBit())),
+        law_growth(line, control, 0),
+    )
+    rates = approximate_roots(free.system()).real / RIG.time_scale
+    assert np.abs(rates / grown - 1.0).min() < 1e-2
+    (first, *_) = [m.value for m in named_roots(free).roots if m.mode.kind == "torsional"]
+    assert grown >= first.real - 1e-6
+
+
+def test_a_string_under_a_drive_loses_its_damping_by_its_law(answering):
+    """A bit that takes more than a stiff drive damps, and less than soft torque does."""
+    line, laws = STRING.torsion, [drive_control(name, RIG) for name in ("stiff", "soft-torque")]
+    stiff, soft = (min(m.slope for m in mode_slopes(line, law, 4)) for law in laws)
+    assert stiff < soft
+    taken = 0.5 * (stiff + soft)
+    answering(-taken)
+    found = vibration_map(POINT, SPEED, ROP, laws[1], threshold=True, **QUICK)
+    against, held = found.threshold.growth
+    np.testing.assert_allclose(against, law_growth(line, laws[0], -taken))
+    np.testing.assert_allclose(held, law_growth(line, laws[1], -taken))
+    assert (against > 0.0).all()
+    assert (held < 0.0).all()
 
 
 def test_a_string_of_sections_has_one_at_fewer_points(monkeypatch):
