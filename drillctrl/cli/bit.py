@@ -11,6 +11,7 @@ import click
 from drillctrl.base.errors import InputError
 from drillctrl.cli.output import check_figure, check_json, deliver
 from drillctrl.cli.point import point_options, read_point, rig_name
+from drillctrl.cli.progress import open_progress
 from drillctrl.cli.verb import Verb
 
 
@@ -19,7 +20,8 @@ from drillctrl.cli.verb import Verb
 @click.option(
     "--amplitudes",
     metavar="A,…",
-    help="Swings of the bit's speed, shares of it, rising in (0, 1); 0.01 to 0.95 without it.",
+    help="Swings of the bit's speed, shares of it, rising in (0, 1); twelve from 0.01 to 0.95 "
+    "without it, five of a long string.",
 )
 @click.option(
     "--frequency",
@@ -46,7 +48,7 @@ from drillctrl.cli.verb import Verb
     "--most-periods",
     type=int,
     help="Periods of each start that are looked at where the orbit is irregular "
-    "(400; with --along 40).",
+    "(400; with --along and of a long string 40).",
 )
 @click.option(
     "--imposed",
@@ -126,25 +128,36 @@ def bit_command(
         patience = {"most_periods": 400, **patience}
         _band(where, wanted, workers, patience, imposed, as_json, out, plot)
         return
+    from drillctrl.drilling.case import as_case
     from drillctrl.motion.report import motion_fields, motion_summary, responses_summary
-    from drillctrl.motion.swing import AMPLITUDES, drilling_motion
+    from drillctrl.motion.response import FEWEST_PERIODS
+    from drillctrl.motion.swing import AMPLITUDES, AMPLITUDES_OF_STRING, drilling_motion
+    from drillctrl.studies.vibration_edge import is_long
 
     asked = [_read_frequency(text, where) for text in frequencies]
-    found = drilling_motion(
-        where,
-        AMPLITUDES if wanted is None else wanted,
-        modes=modes,
-        workers=workers,
-        ripple=not imposed,
-        **patience,
-    )
+    long = is_long(as_case(where))
+    if wanted is None:
+        wanted = [*(AMPLITUDES_OF_STRING if long else AMPLITUDES)]
+    if long:
+        # Its orbit is irregular, and more windows of it tell little more.
+        patience = {"most_periods": FEWEST_PERIODS, **patience}
+        words = f"a minute of processor and more for each of its swings: {len(wanted)}"
+        click.echo(f"drillctrl: note: a long string takes {words}", err=True)
+    with open_progress() as progress:
+        found = drilling_motion(
+            where,
+            wanted,
+            modes=modes,
+            workers=workers,
+            progress=progress,
+            ripple=not imposed,
+            **patience,
+        )
     text, responses = functools.partial(motion_summary, found), None
     if asked:
         from drillctrl.motion.response import bit_response
 
-        responses = [
-            bit_response(where, omega, a, **patience) for omega in asked for a in wanted or ()
-        ]
+        responses = [bit_response(where, omega, a, **patience) for omega in asked for a in wanted]
         text = functools.partial(responses_summary, found, responses)
     draw = functools.partial(found.plot, name=rig_name(point))
     fields = motion_fields(found, responses)
@@ -157,7 +170,7 @@ def _tell_of_drive(where: Any) -> None:
 
     rig = getattr(where, "rig", None)
     if isinstance(rig, StringRig) and rig.drive is not None:
-        told = "its torque is constant here, under no law; it takes a minute and more of a string"
+        told = "its torque is constant here, under no law"
         click.echo(f"drillctrl: note: a top drive turns it: {told}", err=True)
         other = "compare --objective drilling says what laws of it leave of such swings"
         click.echo(f"drillctrl: note: {other}", err=True)

@@ -14,7 +14,7 @@ import numpy as np
 from drillctrl.base.arrays import ComplexArray, FloatArray
 from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
-from drillctrl.base.workers import open_executor, spread_out
+from drillctrl.base.workers import Progress, open_executor, spread_out
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.quantities import response_scale
 from drillctrl.motion.crossings import sign_changes
@@ -25,6 +25,8 @@ from drillctrl.motion.torsion import TorsionalMode, ripple_of, torsional_modes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Of a long string, whose bit takes a minute to answer, fewer.
+AMPLITUDES_OF_STRING = (0.03, 0.1, 0.3, 0.5, 0.8)
 AMPLITUDES = (0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.65, 0.8, 0.95)
 # The frequency follows the root until they differ by no more than this share, at most so
 # often, and not below that share of the string's own.
@@ -187,6 +189,7 @@ def drilling_motion(
     *,
     modes: int = 1,
     workers: int = 1,
+    progress: Progress | None = None,
     **options: Any,
 ) -> DrillingMotion:
     """Return the axial orbit of a point, and the damping left to its torsional modes over swing.
@@ -201,6 +204,8 @@ def drilling_motion(
         So many torsional modes, the slowest.
     workers : int
         Processes.
+    progress : callable, optional
+        Called with the name of a stage, amplitudes done and amplitudes to do.
     **options
         Of `mode_at`.
 
@@ -217,7 +222,7 @@ def drilling_motion(
     found = torsional_modes(case, modes)
     orbit = axial_orbit(case)
     with open_executor(workers, None) as executor:
-        swings = tuple(_swing(case, mode, wanted, executor, options) for mode in found)
+        swings = tuple(_swing(case, mode, wanted, executor, progress, options) for mode in found)
     return DrillingMotion(case, orbit, swings, _floor(case, orbit, swings))
 
 
@@ -297,11 +302,17 @@ def _swing(
     mode: TorsionalMode,
     amplitudes: list[float],
     executor: Executor | None,
+    progress: Progress | None,
     options: dict[str, Any],
 ) -> ModeSwing:
-    def every(wanted: list[float]) -> list[ModeAt]:
+    def every(wanted: list[float], stage: str = "swings") -> list[ModeAt]:
         tasks = [(i, case, mode, a, options) for i, a in enumerate(wanted)]
-        return [each for _, each in sorted(spread_out(executor, _task, tasks), key=lambda x: x[0])]
+        found: dict[int, ModeAt] = {}
+        for index, each in spread_out(executor, _task, tasks):
+            found[index] = each
+            if progress is not None:
+                progress(f"{stage} of mode {mode.number}", len(found), len(wanted))
+        return [found[index] for index in sorted(found)]
 
     at = every(amplitudes)
     for _ in range(_HALVED):
@@ -311,5 +322,5 @@ def _swing(
         wanted = [a for a in middles if all(abs(a - b) > 1e-3 for b in known)]
         if not wanted:
             break
-        at = sorted([*at, *every(wanted)], key=lambda each: each.amplitude)
+        at = sorted([*at, *every(wanted, "nearer swings")], key=lambda each: each.amplitude)
     return ModeSwing(mode, tuple(at))

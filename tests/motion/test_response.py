@@ -356,7 +356,11 @@ def test_a_bit_that_swings_of_itself_has_no_answer():
     assert bouncing.error == math.inf
     (mode,) = torsional_modes(rig_point(60, 20))
     assert mode_at(rig_point(60, 20), mode, 0.03, most_periods=40).sign == 0
-    found = drilling_motion(rig_point(60, 20), (0.03,), most_periods=40)
+    stages = []
+    found = drilling_motion(
+        rig_point(60, 20), (0.03,), most_periods=40, progress=lambda *what: stages.append(what)
+    )
+    assert stages == [("swings of mode 1", 1, 1)]
     (told,) = motion_fields(found)["modes"][0]["amplitudes"]
     assert told["damping_left"] is None
     assert told["growth_rate"] is None
