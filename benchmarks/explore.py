@@ -54,7 +54,9 @@ def name_of(control: ElementHandle) -> str:
 
 def drag(page: Page, draw: random.Random) -> None:
     """Drag the point about."""
-    box = page.locator(".handle").bounding_box()
+    handle = page.locator(".handle")
+    handle.scroll_into_view_if_needed()
+    box = handle.bounding_box()
     if box is None:
         return
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -175,8 +177,7 @@ def clicked(browser: Browser, server: Served, seconds: float, pace: float, seed:
             except Error as error:
                 # What was to be clicked went away, as a button does when its work is done.
                 missed += 1
-                if "Timeout" in str(error):
-                    used["(timeout)"] += 1
+                used[f"({str(error).splitlines()[0]})"] += 1
             clicks += 1
             pages[window].wait_for_timeout(max(1.0, 1e3 * (due - time.monotonic())))
             if time.monotonic() - told > 60.0:

@@ -22,7 +22,8 @@ STYLE = "drillctrl.style"
 # Whether theory is told for a rig too, and the labels of what that is.
 VERBOSE = "drillctrl.verbose"
 _THEORY = ("Point", "Dimensionless", "Result", "Dominant roots", "Checked by", "Optimal by",
-           "Minimised", "Multipliers", "Effort", "Theory")  # fmt: skip
+           "Minimised", "Multipliers", "Effort", "Theory",
+           "Other modes")  # fmt: skip
 
 
 def plain(text: str) -> str:

@@ -114,7 +114,7 @@ class Report:
         else:
             lines = result_lines(design, self.kind)
         if self.modes is not None:
-            lines += self.modes.lines
+            lines += self.modes.lines + self.modes.others
         if self.robustness is not None:
             lines += _robustness_lines(design, self.robustness)
         if self.alternative is not None:

@@ -134,13 +134,29 @@ class NamedRoots:
 
     @property
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people."""
+        """Labels and texts for people: the first modes, and all that grow."""
         named = [("Modes", "the least damped root of each, damping in % of critical")]
-        named += [("", root.text(self.language)) for root in self.roots]
+        named += [("", root.text(self.language)) for root in self.roots if _matters(root)]
+        rest = len(self.others)
+        if rest:
+            verb = "mode dies" if rest == 1 else "modes die"
+            named.append(("", f"{rest} more {verb} away: --verbose lists them, --json too"))
         named += _still(self.roots, self.language)
         if self.control is None:
             return named
         return [("Drive", self.control.name), *named]
+
+    @property
+    def others(self) -> list[tuple[str, str]]:
+        """Labels and texts of the modes that `lines` leaves out."""
+        told = [root.text(self.language) for root in self.roots if not _matters(root)]
+        return [("Other modes" if i == 0 else "", text) for i, text in enumerate(told)]
+
+
+def _matters(root: NamedRoot) -> bool:
+    """Whether people are told of a mode at once."""
+    ratio = root.damping_ratio
+    return root.mode.number <= _SHOWN or (ratio is not None and ratio <= 0.0)
 
 
 def _still(roots: tuple[NamedRoot, ...], language: Language) -> list[tuple[str, str]]:

@@ -26,6 +26,7 @@ from drillctrl import (
     preset_structure,
     string_preset,
 )
+from drillctrl.base.language import SI
 from drillctrl.cli.drive_law import driven_case
 from drillctrl.spectrum import characteristic
 from drillctrl.strings.drive_law import companion, driven_plant, without_integral
@@ -133,11 +134,23 @@ def test_analyze_tells_modes_and_reflection(capsys):
     where = RigPoint(rig, 120 * RPM, 10 * M_PER_H)
     given = f"{-ki} N*m/rad, {-kp} N*m*s/rad"
     case = driven_case(where, "soft-torque", (given, None), False, PaperLaw())
-    lines = named_roots(case).lines
+    named = named_roots(case)
+    lines = named.lines
     assert [label for label, _ in lines[:2]] == ["Drive", "Modes"]
     told = lines[2][1]
     assert told.startswith(f"1st torsional: {first['frequency']:.4g} Hz")
     assert told.endswith(f"critical slope {first['critical_slope']:.4g} N·m·s")
+    # Told at once are the first three of each kind and what grows.
+    shown = [root.text(SI) for root in named.roots if root.mode.number <= 3 or grows(root)]
+    assert [text for _, text in lines[2 : 2 + len(shown)]] == shown
+    others = [text for _, text in named.others]
+    assert sorted(shown + others) == sorted(root.text(SI) for root in named.roots)
+    assert len(others) > 10
+    assert lines[2 + len(shown)][1].startswith(f"{len(others)} more modes die away")
+
+
+def grows(root):
+    return root.damping_ratio is not None and root.damping_ratio < 0.0
 
 
 @pytest.mark.parametrize(
