@@ -36,7 +36,7 @@ def motion_lines(found: DrillingMotion, answers: Sequence[str] = ()) -> list[str
     for swing in found.modes:
         mode = swing.mode
         label = "Swing" if len(found.modes) == 1 else f"Swing {mode.number}"
-        lines.append((label, " ".join(verdict(swing, of_rig=True))))
+        lines.append((label, " ".join(verdict(swing, of_rig=True) + _caution(found.orbit))))
         own = f"{mode.damping * units.response:.4g} {units.response_name}"
         hertz = mode.root.imag / units.turn
         told = f"swings at {hertz:.3f} Hz; its own damping, seen at the bit, is {own}"
@@ -49,6 +49,13 @@ def motion_lines(found: DrillingMotion, answers: Sequence[str] = ()) -> list[str
         told = f"the bit's own torque swings its speed by ±{found.floor:.2%} beside all else"
         lines.append(("Ripple", told.replace("%", " %")))
     return set_out([*lines, *tables]).splitlines()
+
+
+def _caution(orbit: AxialOrbit) -> list[str]:
+    """Say where the bit's own motion may stick it, whatever swings do."""
+    if orbit.settles or orbit.broken is not None or orbit.period is not None:
+        return []
+    return ["But the bit bounces irregularly: simulate says whether it sticks."]
 
 
 def asked_text(response: BitResponse, units: Units) -> str:

@@ -296,7 +296,7 @@ def simulation_summary(run: Simulation, multipliers: Floquet | None = None) -> s
 
 
 def starts_summary(found: StartSet) -> str:
-    """Return a table of what became of each start, and the worst, for people."""
+    """Return the worst of what became of some starts, and a table of them, for people."""
     rows = [("Start", "Outcome", "swing", "stick", "feed")]
     for run in found.runs:
         f = run.figures
@@ -309,7 +309,7 @@ def starts_summary(found: StartSet) -> str:
     ]
     worst = found.worst
     told = wrapped(f"Worst: {worst.start}, {worst.figures.outcome.sentence}")
-    return "\n".join([*lines, told])
+    return "\n".join([told, *lines])
 
 
 def _cell(value: float | None, form: str) -> str:

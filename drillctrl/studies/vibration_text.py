@@ -34,7 +34,7 @@ def closing_text(found: MapValues, closing: Closing) -> str:
         return "without control"
     if isinstance(closing, DriveLaws):
         more = f", {len(closing.depths)} laws by depth" if len(closing.depths) > 1 else ""
-        return f"drive under {closing.name}{more}"
+        return f"{closing.name} drive{more}"
     if isinstance(closing, GainTable):
         return f"{closing.structure.name}, gains of a table"
     _, K1, K2 = closing.gain_sets()

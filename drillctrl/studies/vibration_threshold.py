@@ -210,7 +210,7 @@ def law_growth(line: Line, law: DriveControl, answer: complex) -> float:
                 near = 1e-6 * abs(s)
                 here, there = (complex(bit_impedance(line, law, at)) for at in (s, s + near))
                 s -= (here - wanted) * near / (there - here)
-        rates.append(s.real)
+        rates.append(float(s.real))
     known = max(rates)
     return known if math.isfinite(known) else math.nan
 

@@ -36,6 +36,7 @@ from drillctrl.motion import response
 from drillctrl.motion.along_report import along_fields, along_summary
 from drillctrl.motion.report import motion_fields
 from drillctrl.motion.torsion import forced_speed, ripple_of
+from drillctrl.motion.words import motion_lines
 from drillctrl.simulation.status import Outcome
 from tests.motion.fixed_step import fixed_step_response
 
@@ -364,6 +365,8 @@ def test_a_bit_that_swings_of_itself_has_no_answer():
     (told,) = motion_fields(found)["modes"][0]["amplitudes"]
     assert told["damping_left"] is None
     assert told["growth_rate"] is None
+    irregular = replace(found, orbit=replace(found.orbit, broken=None))
+    assert "bounces irregularly" in " ".join(motion_lines(irregular)[:3])
     quiet = bit_response(rig_point(120, 20), 1.0, 0.03, ripple=True, most_periods=40)
     assert quiet.rippled < 0.03
 

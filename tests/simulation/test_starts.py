@@ -137,7 +137,7 @@ def test_the_command_says_so(capsys, tmp_path):
         main([*arguments, "--require-stable"])
     assert stop.value.code == 3
     told = capsys.readouterr().out
-    assert "Worst: stick, the bit turns backwards" in told
+    assert told.startswith("Worst: stick, the bit turns backwards")
     with pytest.raises(SystemExit) as stop:
         main(["simulate", *rig, "--speed", "150 rpm", "--starts", "small", "--require-stable"])
     assert stop.value.code == 0

@@ -84,8 +84,8 @@ def test_the_difference_is_between_the_two_laws(found):
     figure = found.plot(("swing",), difference=True)
     titles = [ax.get_title() for ax in figure.axes if ax.get_title()]
     assert titles == [
-        "drive under z-torque",
-        "drive under soft-torque",
+        "z-torque drive",
+        "soft-torque drive",
         "change from left to right",
     ]
     told = found.to_dict()
