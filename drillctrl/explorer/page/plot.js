@@ -122,18 +122,22 @@ function drawPlot(container, plot) {
     if (series.name) named.push({ ...series, colour });
   });
   make("rect", { x: LEFT, y: TOP, width: wide, height: high, fill: "none", stroke: "#1a1a1a" }, svg);
-  drawLegend(svg, [...(plot.areas || []).filter(a => a.name).map(a => ({ ...a, area: true })), ...named, ...(plot.legend || [])]);
+  const spots = (plot.series || []).flatMap(s => s.x.map((x, i) => x === null || s.y[i] === null ? [-1, -1] : [px(x), py(s.y[i])]));
+  drawLegend(svg, TOP + high, spots, [...(plot.areas || []).filter(a => a.name).map(a => ({ ...a, area: true })), ...named, ...(plot.legend || [])]);
   if (plot.handle) drawHandle(svg, plot, px, py, wide, high);
   container.replaceChildren(svg);
   return svg;
 }
 
-// Legends stand above the picture's right upper corner, on white.
-function drawLegend(svg, entries) {
+// A legend stands, on white, in the corner where the fewest points are drawn.
+function drawLegend(svg, bottom, spots, entries) {
   if (!entries.length) return;
   const widest = Math.max(...entries.map(entry => entry.name.length));
-  const width = 34 + 6.6 * widest, x = WIDTH - RIGHT - width - 6, y = TOP + 6;
-  make("rect", { x, y, width, height: 8 + 17 * entries.length, fill: "#ffffff", "fill-opacity": 0.86, stroke: "#d0d0d0" }, svg);
+  const width = 34 + 6.6 * widest, height = 8 + 17 * entries.length;
+  const corners = [TOP + 6, bottom - height - 6].flatMap(y => [WIDTH - RIGHT - width - 6, LEFT + 6].map(x => [x, y]));
+  const hidden = ([x, y]) => spots.filter(([a, b]) => a > x && a < x + width && b > y && b < y + height).length;
+  const [x, y] = corners.reduce((best, corner) => hidden(corner) < hidden(best) ? corner : best);
+  make("rect", { x, y, width, height, fill: "#ffffff", "fill-opacity": 0.86, stroke: "#d0d0d0" }, svg);
   entries.forEach((entry, k) => {
     const at = y + 13 + 17 * k;
     if (entry.area) make("rect", { x: x + 6, y: at - 6, width: 18, height: 11, fill: entry.colour, "fill-opacity": entry.opacity || 0.22 }, svg);
