@@ -27,6 +27,8 @@ _CIRCLE = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 CLOSE = 0.2
 # Share of a cluster's spread by which its members may be off before the circle's are taken.
 _ASTRAY = 1e-2
+# Share of what tells them apart that a circle's own errors may have.
+_SHARP = 0.1
 _LARGEST_CLUSTER = 24
 # A count on a circle that is off by more is disturbed by a root close to it.
 _SHARP_COUNT = 1e-12
@@ -217,7 +219,11 @@ def _multiple_root(
     # How far rounding throws numbers apart that are told by their power sums.
     thrown = reach * max(abs(count - size), _LEAST_NOISE) ** (1.0 / size)
     rounding = change <= ROUNDING_TOLERANCE and apart < 8.0 * thrown
-    if not rounding and astray > _ASTRAY * spread:
+    sharp = thrown < _SHARP * apart
+    if not sharp and abs(refined - members.mean()) > spread:
+        # Neither knows how far apart they are.
+        rounding = True
+    if not rounding and sharp and astray > _ASTRAY * spread:
         members, spread = exact, apart
     outer = characteristic.smallest_singular(system, refined + ring)
     weight = float(characteristic.weight(system, np.array([refined]))[0])

@@ -59,6 +59,12 @@ def test_a_double_root_is_found_to_rounding_with_neighbours_beside():
     assert spectral_abscissa(system) == pytest.approx(-2408.205667269, rel=1e-8)
 
 
+def test_a_cluster_keeps_its_members_where_a_circle_about_it_is_disturbed():
+    # Three roots within rounding of one, and a fourth too near to be kept off the circle.
+    system = agreement.random_system(72015634)
+    assert spectral_abscissa(system) == pytest.approx(3.23722816108e-07, rel=1e-9)
+
+
 def test_a_wrong_root_would_be_told(monkeypatch):
     system = DelaySystem([[-1.0]], ([[0.5]],), (1.0,))
     assert agreement.verdict(system, 1.0) == ("agrees", "")
