@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from drillctrl.strings.drive_control import DriveMachine
 from drillctrl.strings.presets import PRESETS as STRING_PRESETS
 from drillctrl.strings.presets import string_preset
 from drillctrl.strings.rig import StringRig, WeightControl, string_rig
-from drillctrl.strings.tally import in_si, read_sections, refuse_lacking
+from drillctrl.strings.tally import in_si, one_of, read_sections, refuse_lacking
 
 # What a fit to a recording knows of its rig, beside the rig itself.
 FIT = "fit"
@@ -216,8 +215,6 @@ def _lacking(
     names = list(known)
     for key in given:
         if key not in names:
-            near = difflib.get_close_matches(str(key), names, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise InputError(f"key in {where}", key, f"one of {', '.join(names)}{hint}")
+            raise InputError(f"key in {where}", key, one_of(key, names))
     missing = [key for key in names if key not in given and key not in optional]
     return f"{', '.join(missing)} in {where}" if missing else ""

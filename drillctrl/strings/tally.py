@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -62,6 +63,13 @@ _USUAL = {
     "geometry": "1",
     "contact_strength": "the rock's strength",
 }
+
+
+def one_of(given: str, names: Iterable[str]) -> str:
+    """Return what a name must be one of, and which of these it resembles."""
+    names = list(names)
+    near = difflib.get_close_matches(given, names, n=1)
+    return f"one of {', '.join(names)}" + (f"; did you mean {near[0]}?" if near else "")
 
 
 def refuse_lacking(lacking: Iterable[str]) -> None:
@@ -135,7 +143,7 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
         behind.append(match[2])
     for name, title in zip(names, table[0], strict=True):
         if name not in COLUMNS:
-            raise InputError(f"column of {path}", title, f"one of {', '.join(COLUMNS)}")
+            raise InputError(f"column of {path}", title, one_of(name, COLUMNS))
     rows = []
     for line, row in enumerate(table[1:], 2):
         where = f"row {line} of {path}"
@@ -155,7 +163,7 @@ def read_tally(path: str | Path) -> tuple[Section, ...]:
 def _section(row: Mapping[str, Any], where: str) -> Section:
     for key in row:
         if key not in COLUMNS:
-            raise InputError(f"key in {where}", key, f"one of {', '.join(COLUMNS)}")
+            raise InputError(f"key in {where}", key, one_of(key, COLUMNS))
     value: dict[str, Any] = {
         key: given if COLUMNS[key] is None else in_si(f"{key} in {where}", given, COLUMNS[key])
         for key, given in row.items()
