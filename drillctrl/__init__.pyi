@@ -210,7 +210,6 @@ from .strings.exact import ExactLoop as ExactLoop
 from .strings.exact import exact_loop as exact_loop
 from .strings.falling import FallingTorque as FallingTorque
 from .strings.files import load_rig as load_rig
-from .strings.files import read_tally as read_tally
 from .strings.model import PipeString as PipeString
 from .strings.named_roots import NamedRoot as NamedRoot
 from .strings.named_roots import NamedRoots as NamedRoots
@@ -231,6 +230,7 @@ from .strings.slopes import critical_slopes as critical_slopes
 from .strings.slopes import drive_delay_margin as drive_delay_margin
 from .strings.slopes import mode_slopes as mode_slopes
 from .strings.slopes import weakest_slope as weakest_slope
+from .strings.tally import read_tally as read_tally
 from .strings.wall import Wall as Wall
 from .studies.campaign import Campaign as Campaign
 from .studies.campaign import campaign as campaign

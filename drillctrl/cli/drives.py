@@ -186,6 +186,8 @@ def _refuse_others(structure: str, bears: Sequence[str]) -> None:
         typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if typed and name not in bears:
             wanted = f"left out with --structure {structure}, a law of a top drive"
+            if name in ("mud", "mud_error"):
+                wanted += ": mud bears on weights, not on what turns"
             raise InputError(parameter.opts[0], context.params[name], wanted)
 
 

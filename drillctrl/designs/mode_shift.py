@@ -59,14 +59,14 @@ class ModeShift:
         return {"kind": self.kind, **found}
 
 
-def mode_shifts(
+def modes_worse(
     plant: DelaySystem,
     structure: FeedbackStructure,
     K1: FloatArray,
     K2: FloatArray,
     quantities: tuple[str, ...] = (),
 ) -> tuple[ModeShift, ...]:
-    """Follow the rightmost roots of a plant while all gains grow together from nothing.
+    """Return the modes that decay more slowly, followed while all gains grow from nothing.
 
     Parameters
     ----------
@@ -86,10 +86,15 @@ def mode_shifts(
     known = [root for root in dominant_roots(plant) if root.multiplicity == 1]
     begun = [root.value for root in known if root.converged]
     ends = _followed(_growing_loop(plant, structure, K1, K2), np.array(begun, dtype=complex))
-    return tuple(
-        ModeShift(mode_kind(plant, start, quantities), start, complex(end.real, abs(end.imag)))
+    shifts = [
+        ModeShift(None, start, complex(end.real, abs(end.imag)))
         for start, end in zip(begun, ends.tolist(), strict=True)
         if not np.isnan(end)
+    ]
+    return tuple(
+        replace(shift, kind=mode_kind(plant, shift.open_loop, quantities))
+        for shift in shifts
+        if shift.worse
     )
 
 

@@ -17,7 +17,6 @@ from drillctrl.drilling.structures import STRUCTURE_NAMES, feed, preset_structur
 from drillctrl.spectrum.count import count_right_of
 from drillctrl.spectrum.pseudospectral import degree_for
 from drillctrl.spectrum.roots import spectral_abscissa
-from drillctrl.synthesis.boundary import decide
 from drillctrl.synthesis.family import loop_family
 from drillctrl.synthesis.reach import Reach, searched_reach
 
@@ -27,8 +26,8 @@ _STEPS = 40
 _BISECTIONS = 30
 _CONTROLLED_STEPS = 8
 _CONTROLLED_BISECTIONS = 5
-# Plants of more states are searched for what their explicit boundary says to be there alone.
-_MANY_STATES = 40
+# Plants of more states are searched for structures of few gains alone.
+_MANY_STATES, _FEW_GAINS = 40, 2
 
 _Range = tuple[float, float]
 
@@ -100,7 +99,7 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
         if kind == "structure" and any(remedy.kind == kind for remedy in found):
             # The presets become richer: the first that stabilises is the simplest.
             continue
-        if many and not _stabilises(failed, candidate):
+        if many and candidate.lower.size > _FEW_GAINS:
             continue
         result = design(failed.case, candidate, trials=False)
         if result.stable:
@@ -113,12 +112,6 @@ def remedies(failed: Design) -> tuple[Remedy, ...]:
     if controlled is not None:
         found.append(Remedy("speed", failed.structure.name, controlled))
     return tuple(found) if alone is None else (*found, Remedy("speed", "none", alone))
-
-
-def _stabilises(failed: Design, candidate: FeedbackStructure) -> bool:
-    """Whether gains of a structure of one or two are known to stabilise the point."""
-    decision = decide(loop_family(failed.case.system(candidate.inputs), candidate))
-    return decision is not None and decision.possible
 
 
 def _candidates(failed: Design) -> Iterator[tuple[str, FeedbackStructure]]:

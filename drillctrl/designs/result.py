@@ -11,7 +11,7 @@ from drillctrl.base.text import set_out
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.designs.fields import design_fields, result_fields
 from drillctrl.designs.loop_analysis import DEFAULT_ORDER, analyze_loop, discretised_radius
-from drillctrl.designs.mode_shift import ModeShift, mode_kind, mode_shifts
+from drillctrl.designs.mode_shift import ModeShift, mode_kind, modes_worse
 from drillctrl.designs.values import AnalysisValues, DesignValues, closed_loop
 from drillctrl.designs.verdict import try_gains
 from drillctrl.designs.words import design_lines, result_lines
@@ -44,7 +44,7 @@ class Analysis(AnalysisValues):
     spectral_radius : SpectralRadius or None
         ρ(D) of the semi-discretised loop; None without delay.
     modes_worse : tuple of ModeShift
-        Modes that decay more slowly with the gains than without; see `mode_shifts`.
+        Modes that decay more slowly with the gains than without; see `modes_worse`.
     verdict : Verdict
         What trial runs on the nonlinear motion say of the gains, if there were any.
     elapsed_seconds : float
@@ -174,8 +174,7 @@ def assess(
     loop = analyze_loop(system)
     worse: tuple[ModeShift, ...] = ()
     if feedback is not None:
-        shifts = mode_shifts(plant, feedback, K1, K2, _quantities(case))
-        worse = tuple(shift for shift in shifts if shift.worse)
+        worse = modes_worse(plant, feedback, K1, K2, _quantities(case))
     alone = loop if feedback is None else analyze_loop(plant)
     radius = discretised_radius(system, m, order)
     return Analysis(case, plant, feedback, K1, K2, loop, alone, radius, worse)

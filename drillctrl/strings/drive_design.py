@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +49,8 @@ _HIGHEST, _FAR, _WITHIN, _ALONE = 60.0, 60, 40, 80
 _FEWER = 4
 _BEGUN, _STEPS = 3, 220
 _CHANGE = 1e-6
+# What a law makes of the speed of the top and of the pipe's torque; see `DriveControl.ends`.
+_Ends = tuple[ComplexArray, ComplexArray]
 
 
 class _Loop(NamedTuple):
@@ -93,6 +96,19 @@ class _Slopes:
 
     def __init__(self, family: LawFamily, loops: list[_Loop]) -> None:
         self.family, self.loops = family, loops
+        # All that is looked at, in one array: laws are evaluated once for all loops.
+        drives = [one for loop in loops for one in (loop.far, loop.alone, loop.near, loop.drive)]
+        self._drives = DriveSignals(
+            *(np.concatenate(values) for values in zip(*drives, strict=True))
+        )
+        ends = np.cumsum([0, *(one.x.size for one in drives)]).tolist()
+        self._places = [slice(*pair) for pair in pairwise(ends)]
+
+    def _ends(self, numbers: FloatArray) -> list[list[_Ends]]:
+        """Return what a law makes of each loop: far, alone, near, and where slopes are read."""
+        speed, torque = self.family.ends(numbers, self._drives)
+        found = [(speed[place], torque[place]) for place in self._places]
+        return [found[i : i + 4] for i in range(0, len(found), 4)]
 
     def value(self, numbers: FloatArray) -> tuple[float, int, int]:
         """Return the slope, and the loop and the sample before the crossing that decide it.
@@ -100,10 +116,10 @@ class _Slopes:
         Where a root grows without any slope it is minus infinity.
         """
         best = (np.inf, 0, 0)
-        for i, loop in enumerate(self.loops):
-            if self._grows(numbers, loop):
+        for i, (loop, ends) in enumerate(zip(self.loops, self._ends(numbers), strict=True)):
+            if self._grows(loop, *ends[:3]):
                 return -np.inf, i, 0
-            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
+            z = _impedance(loop.s, loop.matrix, ends[3]) + loop.answer
             up, slopes = _crossings(z)
             counted = slopes * loop.weights[up]
             if counted.size and counted.min() < best[0]:
@@ -121,7 +137,7 @@ class _Slopes:
         answer = loop.answer[here]
 
         def crossing(moved: FloatArray) -> float:
-            z = self._impedance(moved, s, matrix, drive) + answer
+            z = _impedance(s, matrix, self.family.ends(moved, drive)) + answer
             share = -z.imag[0] / (z.imag[1] - z.imag[0])
             return float(z.real[0] + share * (z.real[1] - z.real[0]))
 
@@ -130,16 +146,7 @@ class _Slopes:
         slope = np.array([crossing(numbers + step) - known for step in steps]) / _CHANGE
         return -value / pipe, -slope * loop.weights[at] / pipe
 
-    def _impedance(
-        self, numbers: FloatArray, s: ComplexArray, matrix: ComplexArray, drive: DriveSignals
-    ) -> ComplexArray:
-        """Return the impedance that the bit sees."""
-        speed, torque = self.family.ends(numbers, drive)
-        force = s * torque
-        moment = matrix[:, 1, 0] * speed + matrix[:, 1, 1] * force
-        return np.asarray(moment / ((matrix[:, 0, 0] * speed + matrix[:, 0, 1] * force) * s))
-
-    def _grows(self, numbers: FloatArray, loop: _Loop) -> bool:
+    def _grows(self, loop: _Loop, far: _Ends, alone: _Ends, near: _Ends) -> bool:
         """Whether a root of string and drive grows, or might above the frequencies looked at.
 
         The characteristic function is N + ζ D, the drive on an endless pipe, times 1 − r E with
@@ -147,17 +154,15 @@ class _Slopes:
         """
         pipe = self.family.pipe
 
-        def parts(drive: DriveSignals) -> tuple[ComplexArray, ComplexArray]:
-            speed, torque = self.family.ends(numbers, drive)
-            whole = torque + pipe * speed
-            return whole, (torque - pipe * speed) / whole
+        def reflected(ends: _Ends) -> ComplexArray:
+            speed, torque = ends
+            return (torque - pipe * speed) / (torque + pipe * speed)
 
         # Above, no more comes back than a wave loses on its way.
-        if (np.abs(parts(loop.far)[1]) * loop.loudest >= 1.0).any():
+        if (np.abs(reflected(far)) * loop.loudest >= 1.0).any():
             return True
-        whole = parts(loop.alone)[0] / (loop.alone.inertia + pipe)
-        returned = 1.0 - parts(loop.near)[1] * loop.echo
-        return bool(_turns(whole) or _turns(returned))
+        whole = (alone[1] + pipe * alone[0]) / (loop.alone.inertia + pipe)
+        return _turns(whole) or _turns(1.0 - reflected(near) * loop.echo)
 
 
 class _Swing(_Slopes):
@@ -184,7 +189,8 @@ class _Swing(_Slopes):
     def free_slope(self, numbers: FloatArray) -> float:
         """Return the smallest slope of the first modes of the string as it is, its bit free."""
         loop = self.loops[0]
-        up, slopes = _crossings(self._impedance(numbers, loop.s, loop.matrix, loop.drive))
+        ends = self.family.ends(numbers, loop.drive)
+        up, slopes = _crossings(_impedance(loop.s, loop.matrix, ends))
         return float(slopes[loop.weights[up] == 1.0].min(initial=np.inf))
 
     def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
@@ -199,9 +205,17 @@ class _Swing(_Slopes):
     def _mean_square(self, numbers: FloatArray) -> float:
         found = 0.0
         for loop in self.loops:
-            z = self._impedance(numbers, loop.s, loop.matrix, loop.drive) + loop.answer
+            ends = self.family.ends(numbers, loop.drive)
+            z = _impedance(loop.s, loop.matrix, ends) + loop.answer
             found += float((loop.force / np.abs(z) ** 2).sum())
         return math.log(found / len(self.loops))
+
+
+def _impedance(s: ComplexArray, matrix: ComplexArray, ends: _Ends) -> ComplexArray:
+    """Return the impedance that the bit sees."""
+    speed, force = ends[0], s * ends[1]
+    moment = matrix[:, 1, 0] * speed + matrix[:, 1, 1] * force
+    return np.asarray(moment / ((matrix[:, 0, 0] * speed + matrix[:, 0, 1] * force) * s))
 
 
 def _crossings(z: ComplexArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
@@ -213,8 +227,12 @@ def _crossings(z: ComplexArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
 
 def _turns(values: ComplexArray) -> bool:
     """Whether a function turns about 0 on its way from a real value to its last one."""
-    turned = np.angle(values[1:] / values[:-1]).sum() + np.angle(values[0])
-    return bool(abs(turned - np.angle(values[-1])) > 1.0)
+    below = values.imag < 0.0
+    at = np.flatnonzero(below[1:] != below[:-1])
+    one, other = values[at], values[at + 1]
+    # It does where it crosses the negative axis more often one way than the other.
+    behind = (one.real * other.imag - other.real * one.imag) / (other.imag - one.imag) < 0.0
+    return bool(np.where(below[at], -1, 1)[behind].sum() != 0)
 
 
 def stretched(line: Line, factor: float) -> Line:

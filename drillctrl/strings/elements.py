@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -323,7 +324,8 @@ def resolved(line: Line, frequency: float, tolerance: float) -> tuple[Reduced, f
         # What elements are off grows smoothly with frequency.
         off = _distance(line, chain, s[::-_FEWER], exact[::-_FEWER]) / tolerance
         if off <= _ELEMENTS_SHARE:
-            modes = free_modes(chain, 32)
+            # Half a wave there and back from mode to mode, and as many as a tolerance may ask for.
+            modes = free_modes(chain, 32 + math.ceil(2.0 * frequency * line.transit_time))
             count = int(np.searchsorted(modes.frequencies, frequency)) + 2
             while count <= size - 3:
                 if count > modes.frequencies.size:

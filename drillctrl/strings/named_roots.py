@@ -285,17 +285,22 @@ def _by_mode(
 
 def _newton(loop: ExactLoop, begin: ComplexArray) -> ComplexArray:
     """Return the roots that Newton's method reaches from many places at once."""
-    s = np.asarray(begin, dtype=complex)
+    s = np.array(begin, dtype=complex)
     change = np.full(s.shape, np.inf, dtype=complex)
+    left = np.arange(s.size)
     for _ in range(_STEPS):
-        step = 1e-6 * np.maximum(np.abs(s), 1e-3)
-        values = [loop(s), loop(s + step), loop(s - step)]
+        here = s[left]
+        step = 1e-6 * np.maximum(np.abs(here), 1e-3)
+        values = [loop(here), loop(here + step), loop(here - step)]
         with np.errstate(all="ignore"):
-            change = 2.0 * step * values[0] / (values[1] - values[2])
-            size = np.abs(change) / (_SHORT * np.abs(s) + 1e-300)
-            change = np.where(size > 1.0, change / size, change)
-        change = np.where(np.isfinite(change), change, 0.0)
-        s = s - change
+            move = 2.0 * step * values[0] / (values[1] - values[2])
+            size = np.abs(move) / (_SHORT * np.abs(here) + 1e-300)
+            move = np.where(size > 1.0, move / size, move)
+        change[left] = np.where(np.isfinite(move), move, 0.0)
+        s[left] -= change[left]
+        left = left[np.abs(change[left]) >= _CONVERGED * np.maximum(np.abs(s[left]), 1e-3)]
+        if not left.size:
+            break
     done = np.abs(change) < _CONVERGED * np.maximum(np.abs(s), 1e-3)
     return np.asarray(s[done & (np.abs(loop(s)) < 1e-3)])
 

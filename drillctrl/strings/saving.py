@@ -15,9 +15,10 @@ from drillctrl.base.kinds import checks_kinds
 from drillctrl.base.units import Dimension
 from drillctrl.drilling.rig import Rig, rig_mapping
 from drillctrl.strings.drive_control import DriveMachine
-from drillctrl.strings.files import COLUMNS, PARTS
+from drillctrl.strings.files import PARTS
 from drillctrl.strings.rig import StringRig
 from drillctrl.strings.section import Section
+from drillctrl.strings.tally import COLUMNS
 
 # As people write them, where nothing is lost by it.
 _SPELT = {

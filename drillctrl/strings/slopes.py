@@ -174,6 +174,7 @@ def sign_changes(
     return high, np.asarray(rising)
 
 
+@functools.lru_cache(maxsize=64)
 def mode_bands(line: Line, count: int) -> tuple[FloatArray, FloatArray]:
     """Return the first frequencies of torsion, (count,), and where each one's band ends, Hz."""
     # A short string needs short elements for as many modes.

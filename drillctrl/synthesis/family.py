@@ -30,6 +30,7 @@ from drillctrl.synthesis.boxes import (
     natural_speed,
 )
 from drillctrl.synthesis.expansion import Expansion, expand
+from drillctrl.synthesis.signals import Signals, signals_of
 
 # Gains that need more make the loop far faster than its plant; their loops are looked at again.
 _FINEST = 64
@@ -201,9 +202,18 @@ class LoopFamily:
         return bool(np.linalg.matrix_rank(self.drive) == 1) if self.drive.size else False
 
     @functools.cached_property
+    def signals(self) -> Signals | None:
+        """What its past and gains act on, where it has many states and few of these."""
+        return signals_of(self.plain, self.drive, self.seen, self.lags)
+
+    def near(self, s: ComplexArray) -> FloatArray:
+        """Return radii around places on which `taylor` has its samples, (q,) → (q,)."""
+        return 0.1 * (1.0 + np.abs(s)) if self.signals is None else self.signals.near(s)
+
+    @functools.cached_property
     def expansion(self) -> Expansion | None:
         """The determinant as a quasi-polynomial; None with several inputs or delays."""
-        if not self.is_affine or len(self.plain.delays) > 1:
+        if not self.is_affine or len(self.plain.delays) > 1 or self.signals is not None:
             return None
         return expand(self.plain, self.drive, self.seen, self.lags > 0.0)
 
@@ -224,16 +234,21 @@ class LoopFamily:
         Returns
         -------
         array, (q, terms), and array, (q, terms, k)
-            Taylor coefficients and their derivatives by the gains.
+            Taylor coefficients and their derivatives by the gains; of many states over the
+            size of det Δ at the place without feedback.
         """
         if self.expansion is not None:
             each = self.expansion.taylor(s, terms)
             slopes = each[:, 1:].transpose(0, 2, 1) @ self.spread
             return each[:, 0] + slopes @ gains, slopes
         # Samples on a circle: aliasing falls with the power points − terms.
-        radius = 0.1 * (1.0 + np.abs(s))
+        radius = self.near(s)
         ring = s[:, None] + radius[:, None] * _CIRCLE
-        value, slope = self.determinant(ring.ravel(), gains)
+        if self.signals is None:
+            value, slope = self.determinant(ring.ravel(), gains)
+        else:
+            value, slope = self.signals.determinant(ring, s, self.spread @ gains)
+            slope = slope @ self.spread
         wave = _CIRCLE[:, None] ** -np.arange(terms) / _CIRCLE.size
         scale = radius[:, None] ** -np.arange(terms)
         slopes = np.einsum("qpk,pl->qlk", slope.reshape(*ring.shape, gains.size), wave)

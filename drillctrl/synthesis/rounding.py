@@ -85,7 +85,12 @@ def hold_multiple_root(family: LoopFamily, basin: Basin) -> FloatArray:
     array, (k,)
         Gains within the bounds.
     """
-    if len(basin.roots) != 1 or basin.roots[0].omega or basin.roots[0].multiplicity < 3:
+    if (
+        family.signals is not None
+        or len(basin.roots) != 1
+        or basin.roots[0].omega
+        or basin.roots[0].multiplicity < 3
+    ):
         return basin.gains
     k = basin.roots[0].multiplicity
     lower, upper = family.feedback.lower, family.feedback.upper

@@ -15,14 +15,12 @@ from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.explicit import explicit_candidates
 from drillctrl.synthesis.family import ActiveRoot, LoopFamily, loop_family
 from drillctrl.synthesis.spread import spread_points
-from drillctrl.synthesis.tracking import abscissa_along
+from drillctrl.synthesis.tracking import abscissa_along, coarse_family, exact_abscissa
 
 # Relative distances up to which eigenvalues may be meant to coincide.
 _WIDTHS = (0.05, 0.2, 0.5)
 # How often a descent may be taken up again where sharpening led away from its end.
 _DESCENTS = 4
-# Plants of so many states are looked at by a collocation of this degree before descents begin.
-_MANY_STATES, _COARSE = 40, 16
 # How often a collocation is drawn further left, and how far at most, over the longest delay.
 _DEEPER, _LEFTMOST = 6, -200.0
 
@@ -57,6 +55,13 @@ EFFORTS = {
     2: Effort(32, 5, 35, 2, 3),
     3: Effort(128, 10, 80, 5, 4),
     4: Effort(256, 18, 80, 6, 4),
+}
+# Of a plant of many states few descents are begun that go on for long.
+_MANY_STATES = {
+    1: Effort(12, 2, 25, 1, 1),
+    2: Effort(16, 4, 35, 2, 3),
+    3: Effort(24, 6, 160, 3, 4),
+    4: Effort(24, 8, 200, 3, 4),
 }
 
 
@@ -128,7 +133,8 @@ def global_search(
         value, _ = family.abscissa(family.feedback.lower)
         only = Basin(family.feedback.lower, value, ())
         return Search(only, (only,), 1, 1)
-    effort = EFFORTS[min(count, 4)] if effort is None else effort
+    if effort is None:
+        effort = EFFORTS[min(count, 4)] if family.signals is None else _MANY_STATES[min(count, 4)]
     family = _near_what_is(family)
     search = _in_boxes(family, seed, effort, known)
     for _ in range(_DEEPER):
@@ -209,7 +215,7 @@ def _in_box(family: LoopFamily, seed: int, effort: Effort, known: Sequence[Float
         seen = any(np.abs((basin.gains - e.gains) / width).max() < 2e-3 for e in ends[:i])
         if len(sharp) == effort.sharpened or seen:
             # Exact: near a multiple root the collocation promises more than there is.
-            exact = family.exact(basin.gains)
+            exact = exact_abscissa(family)(basin.gains)
             rest.append(Basin(basin.gains, exact, ()))
             evaluations += 1
             continue
@@ -238,16 +244,13 @@ def starting_points(
     points = np.vstack([wide, np.clip(0.2 * wide, lower, upper)])
     inside = lower + (upper - lower) * np.array([[0.01], [0.99]])
     # Which are the best shows at a coarse collocation, too.
-    many = family.system.order >= _MANY_STATES and family.degree > 2 * _COARSE
-    coarse = family
-    if many:
-        coarse = loop_family(family.system, family.feedback, _COARSE, family.line)
+    coarse = coarse_family(family)
     values = coarse.abscissas(points)
     order = np.argsort(values, kind="stable")
     chosen = points[order[: effort.begun]]
     if placed:
         deepest = -4.0 * (1.0 + abs(float(values[order[0]])))
-        explicit = explicit_candidates(family, deepest, 4.0, max(2, effort.begun // 6))
+        explicit = explicit_candidates(coarse, deepest, 4.0, max(2, effort.begun // 6))
         chosen = np.vstack([explicit, chosen[: max(0, effort.begun - len(explicit))]])
     return np.asarray(np.clip(chosen, inside[0], inside[1]))
 
@@ -281,11 +284,11 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
         Evaluations used.
     """
     # From here on abscissas are exact: the collocation's error is as large as what is gained.
-    used = 1
-    best = Basin(basin.gains, family.exact(basin.gains), ())
+    used, exact = 1, exact_abscissa(family)
+    best = Basin(basin.gains, exact(basin.gains), ())
     tried: set[tuple[tuple[bool, int], ...]] = set()
     for _ in range(rounds):
-        values = family.eigenvalues(best.gains)
+        values = coarse_family(family).eigenvalues(best.gains)
         used += 1
         improved = False
         for width in _WIDTHS:
@@ -295,7 +298,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
                     continue
                 tried.add(key)
                 sharp = sharpen(family, best.gains, best.value, roots)
-                value = family.exact(sharp.gains)
+                value = exact(sharp.gains)
                 used += sharp.evaluations + 1
                 converged = sharp.residual < 1e-9 and value < sharp.abscissa + _blur(roots)
                 if converged and sharp.abscissa < best.value - 1e-12:

@@ -76,6 +76,10 @@ def test_the_table_on_the_command_line(call, tmp_path):
             ("--rig", "vertical-3000", "--structure", "stiff", "--depth", "2 km", "--seed", "3"),
             "--seed",
         ),
+        (
+            ("--rig", "vertical-3000", "--structure", "stiff", "--depth", "2 km", "--mud", "1 sg"),
+            "mud bears on weights",
+        ),
         (("--rig", "paper-string", "--structure", "stiff", "--depth", "2 km"), "[top_drive]"),
         (("--omega0", "9", "--delta0", "2", "--depth", "2:3:2 km"), "--depth"),
         (

@@ -72,3 +72,25 @@ def test_few_states_are_left_to_eigenvalues():
     structure = FeedbackStructure("p", ("x",), [[-1.0]], [[1.0]], [[0.0]], [[0.0]], inputs=("u",))
     few = loop_family(plant, structure)
     assert abscissa_along(few) == few.abscissa
+
+
+def test_taylor_of_many_states_beside_their_matrices(family):
+    """Coefficients give det Δ nearby, over its size without feedback, and its slopes by gains."""
+    gains = np.array([0.5, -0.2, 0.4, 0.3])
+    places = np.array([-0.2 + 3.1j, 0.1 + 0.4j, -0.5 + 0.0j])
+    taylor, slopes = family.taylor(places, gains, 6)
+    step = 0.02 * family.near(places)
+    poles = np.linalg.eigvals(family.plain.A0)
+
+    def determinant(s, at):
+        sign, size = np.linalg.slogdet(family.characteristic_matrix(s, at))
+        free = np.log(np.abs(places[:, None] - poles)).sum(axis=1)
+        return sign * np.exp(size - free)
+
+    near = (taylor * step[:, None] ** np.arange(6)).sum(axis=1)
+    assert near == pytest.approx(determinant(places + step, gains), rel=1e-8)
+    # It is affine in the gains.
+    change = np.array([0.1, -0.3, 0.2, 0.5])
+    moved = determinant(places, gains + change)
+    expected = taylor[:, 0] + slopes[:, 0] @ change
+    assert expected == pytest.approx(moved, rel=1e-9)
