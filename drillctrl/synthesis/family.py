@@ -10,7 +10,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, UndecidedError
 from drillctrl.delay.closing import close_loop, feedback_lags, loop_channels, with_terms
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
@@ -250,8 +250,11 @@ class LoopFamily:
         return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
 
     def exact(self, gains: FloatArray) -> float:
-        """Return the spectral abscissa of the delay system."""
-        return spectral_abscissa(self.loop(gains))
+        """Return the spectral abscissa of the delay system, infinite where it cannot be told."""
+        try:
+            return spectral_abscissa(self.loop(gains))
+        except UndecidedError:
+            return np.inf
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""

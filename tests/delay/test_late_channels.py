@@ -20,6 +20,7 @@ from drillctrl import (
     lifted_system,
     loop_transfer,
     paper_plant,
+    pid_control,
     spectral_abscissa,
     with_filter,
     with_late_output,
@@ -218,10 +219,10 @@ def test_what_cannot_have_late_channels_says_so(many):
 
 @pytest.fixture(scope="module")
 def exchanger():
-    """A heated body, a cooler and two long pipes, with the sum of the error.
+    """A heater, a mixer, a cooler and long pipes, with the sum of the error.
 
-    Delays in the states up to 40 s and one of 13.2 s at the input; the other numbers are made up
-    in the manner of such set-ups.
+    The heat transfer set-up of Vyhlídal, Zítek and Paulů, with the constants that tdcpy states
+    for it (examples/example_closed_loop_static.py, "Heat Exchanger problem").
     """
     terms = {tau: np.zeros((5, 5)) for tau in (0.0, 2.8, 6.5, 9.2, 13.0, 18.0, 40.0)}
     terms[0.0][1:3, :3] = [[1.0 / 3.0, -2.0 / 3.0, 0.0], [0.0, 0.0, -1.0 / 3.0]]
@@ -256,6 +257,42 @@ def test_a_late_input_before_six_other_delays(exchanger):
     assert response[..., 0] == pytest.approx(expected, rel=1e-12)
     loop = loop_transfer(plant, structure, gains, None, np.array([0.05]))
     assert loop[0, 0, 0] == pytest.approx(-(gains @ expected)[0, 0], rel=1e-12)
+
+
+@pytest.mark.long
+def test_a_pi_controller_behind_a_late_input_before_six_other_delays(exchanger):
+    """The temperature behind the cooler, held without the sum of the error among the states."""
+    _, terms, drive = exchanger
+    alone = DelaySystem(
+        terms[0.0][:4, :4],
+        tuple(matrix[:4, :4] for tau, matrix in terms.items() if tau),
+        tuple(tau for tau in terms if tau),
+        drive[:4],
+        np.eye(4)[3:],
+        input_delays=(13.2,),
+    )
+    controlled, structure = pid_control(alone, "u1", "y1", proportional=5.0, integral=0.1)
+    found = design(controlled, structure, trials=False)
+    kp, ki = found.K1[0]
+
+    def by_hand(s):
+        delta = s * np.eye(4) - sum(matrix[:4, :4] * np.exp(-s * t) for t, matrix in terms.items())
+        plain = np.linalg.solve(delta, drive[:4])[3, 0] * np.exp(-13.2 * s)
+        return np.linalg.det(delta) * (s - (kp * s + ki) * plain)
+
+    # All active roots are roots of the equation by hand, and none lies right of them.
+    for root in found.loop.dominant_roots:
+        assert abs(by_hand(root.value)) < 1e-9 * abs(by_hand(root.value + 1e-2))
+    line = found.spectral_abscissa + 1e-5
+    omega = np.concatenate([np.linspace(0.0, 3.0, 2001), np.linspace(3.0, 60.0, 1001)[1:]])
+    turned = np.unwrap(np.angle([by_hand(line + 1j * w) for w in omega]))
+    # From 0 to far up the phase of a polynomial of degree 5 turns by 5 quarters.
+    assert (turned[-1] - turned[0]) / (0.5 * np.pi) == pytest.approx(5.0, abs=0.05)
+    assert found.spectral_abscissa < 0.0
+    sampled = loop_family(controlled, structure).abscissas(
+        np.stack(np.meshgrid(np.linspace(-5, 5, 21), np.linspace(-0.1, 0.1, 21)), -1).reshape(-1, 2)
+    )
+    assert found.spectral_abscissa < sampled.min() + 1e-9
 
 
 @pytest.mark.long
