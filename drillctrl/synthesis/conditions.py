@@ -129,7 +129,7 @@ def conditions(
     """Pose the conditions of a configuration that was suggested at given gains."""
     omega = np.array([root.omega for root in roots])
     s = abscissa + 1j * omega
-    ladder = (0.1 * (1.0 + np.abs(s)))[:, None] ** np.arange(_TERMS)
+    ladder = family.reach(s)[:, None] ** np.arange(_TERMS)
     sizes = np.abs(family.taylor(s, gains, _TERMS)[0] * ladder).max(axis=1)
     start = np.concatenate([gains, [abscissa], omega[omega != 0.0]])
     return Conditions(family, roots, tuple(ladder / sizes[:, None]), start)

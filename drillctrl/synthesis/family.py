@@ -33,7 +33,7 @@ from drillctrl.synthesis.expansion import Expansion, expand
 
 # Gains that need more make the loop far faster than its plant; their loops are looked at again.
 _FINEST = 64
-_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)
 
 
 @dataclass(frozen=True)
@@ -231,13 +231,21 @@ class LoopFamily:
             slopes = each[:, 1:].transpose(0, 2, 1) @ self.spread
             return each[:, 0] + slopes @ gains, slopes
         # Samples on a circle: aliasing falls with the power points − terms.
-        radius = 0.1 * (1.0 + np.abs(s))
+        radius = self.reach(s)
         ring = s[:, None] + radius[:, None] * _CIRCLE
         value, slope = self.determinant(ring.ravel(), gains)
         wave = _CIRCLE[:, None] ** -np.arange(terms) / _CIRCLE.size
         scale = radius[:, None] ** -np.arange(terms)
         slopes = np.einsum("qpk,pl->qlk", slope.reshape(*ring.shape, gains.size), wave)
         return value.reshape(ring.shape) @ wave * scale, slopes * scale[..., None]
+
+    def reach(self, s: ComplexArray) -> FloatArray:
+        """Return the radius about many places, (q,), within which no exp(−sτ) turns far.
+
+        Samples on a wider circle would take det Δ for another function.
+        """
+        longest = max([*self.plain.delays, *self.lags.tolist()], default=0.0)
+        return np.asarray(np.minimum(0.1 * (1.0 + np.abs(s)), 1.0 / (longest or 1.0)))
 
     def seen_at(self, s: ComplexArray) -> ComplexArray:
         """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
