@@ -9,8 +9,8 @@ from typing import Any
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.point import OperatingPoint
+from drillctrl.simulation.begin import check_start
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.layout import check_start
 from drillctrl.simulation.outcome import (
     Figures,
     figures,

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
+from drillctrl.simulation.begin import March, resized
 from drillctrl.simulation.compile import kernel
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import March, resized
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.status import Status
 from drillctrl.simulation.structure import Structure

@@ -223,9 +223,8 @@ def _quiet_instant(run: Simulation, period: float) -> float:
         middles = begin + np.floor((middles - begin) / sampling) * sampling
     motion = run.at(middles)
     free = motion.contact & ~motion.stuck & ~motion.held & (middles > edges[:-1])
-    if run.controller is not None:
-        saturated = run.phases("saturated")
-        free &= np.array([not any(a <= t <= b for a, b in saturated) for t in middles])
+    bound = run.phases("riding") + (() if run.controller is None else run.phases("saturated"))
+    free &= np.array([not any(a <= t <= b for a, b in bound) for t in middles])
     if not free.any():
         raise InputError("run", _length(run), "one that turns freely for some of its period")
     return float(middles[np.where(free, np.diff(edges), 0.0).argmax()])

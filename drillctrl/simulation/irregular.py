@@ -10,7 +10,7 @@ import numpy as np
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.linear import BIT_STATES
-from drillctrl.simulation.layout import longest_lag
+from drillctrl.simulation.begin import longest_lag
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Scenario

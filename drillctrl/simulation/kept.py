@@ -110,7 +110,7 @@ def _check_steps(
     limits = {
         data.CONTACT: 1,
         data.TORSION: data.REVERSE,
-        data.AXIAL: data.UP,
+        data.AXIAL: data.RIDING,
         data.LEVEL: data.NO_BREAK,
         data.LAG: rows - 1,
         data.FACE: rows - 1,

@@ -11,9 +11,10 @@ from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds, makes_of_kinds
 from drillctrl.drilling.case import Where, as_case
 from drillctrl.simulation.advance import finished, go_on
+from drillctrl.simulation.begin import FIRST_ROOM, March, begin, check_start
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.kernel import data
-from drillctrl.simulation.layout import FIRST_ROOM, March, begin, check_start, settings_for
+from drillctrl.simulation.layout import settings_for
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.scenario import Scenario
 from drillctrl.simulation.structure import Structure, structure_of

@@ -12,8 +12,8 @@ from typing import Any
 from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.case import Where, as_case
+from drillctrl.simulation.begin import check_start
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.layout import check_start
 from drillctrl.simulation.outcome import Figures, figures
 from drillctrl.simulation.result import Simulation
 from drillctrl.simulation.run import simulate

@@ -34,7 +34,8 @@ class Event(NamedTuple):
     name : str
         ``"stick"``, ``"release"``, ``"reverse"`` (torsion); ``"resume"`` (the bit is back where
         it turned back); ``"hold"``, ``"advance"``,
-        ``"lift"`` (Z' becomes 0, positive, negative in contact); ``"loss"``, ``"return"``
+        ``"lift"`` (Z' becomes 0, positive, negative in contact); ``"ride"`` (on a face that falls
+        away, pressed on it by less than all of the wear-flat force); ``"loss"``, ``"return"``
         (of contact); ``"saturate"``, ``"desaturate"`` (an input meets or leaves its limit, or
         an actuator its limit of rate; a sampled controller has no such instants).
     """
@@ -246,7 +247,7 @@ class Trace:
     def events(self) -> tuple[Event, ...]:
         """Changes of mode in order of time."""
         torsion = {data.STUCK: "stick", data.FORWARD: "release", data.REVERSE: "reverse"}
-        axial = {data.HELD: "hold", data.DOWN: "advance", data.UP: "lift"}
+        axial = {data.HELD: "hold", data.DOWN: "advance", data.UP: "lift", data.RIDING: "ride"}
         contact = {0: "loss", 1: "return"}
         found = []
         start, on_rock = self._column("START"), self._column("CONTACT")
@@ -261,7 +262,8 @@ class Trace:
             for name, names in (("contact", contact), ("torsion", torsion), ("axial", axial)):
                 now, before = int(columns[name][j]), int(columns[name][j - 1])
                 # Off the rock there is no wear flat that could hold the bit.
-                meaningless = name == "axial" and not (on_rock[j] and on_rock[j - 1])
+                both = on_rock[j] and (on_rock[j - 1] or now == data.RIDING)
+                meaningless = name == "axial" and not both
                 if now != before and not meaningless:
                     found.append(Event(time, names[now]))
             if behind[j] < behind[j - 1]:
@@ -278,13 +280,15 @@ class Trace:
 
         Parameters
         ----------
-        name : {"stuck", "held", "lost", "saturated", "reverse", "behind"}
-            Torsional stick, axial hold, loss of contact, an input or actuator at its limit;
-            rotation backwards, and until the bit is again where it turned back.
+        name : {"stuck", "held", "riding", "lost", "saturated", "reverse", "behind"}
+            Torsional stick, axial hold, riding on a face that falls away, loss of contact, an
+            input or actuator at its limit; rotation backwards, and until the bit is again where
+            it turned back.
         """
         modes = {
             "stuck": self._column("TORSION") == data.STUCK,
             "held": self._column("AXIAL") == data.HELD,
+            "riding": self._column("AXIAL") == data.RIDING,
             "lost": self._column("CONTACT") == 0,
             "saturated": self._column("SATURATED") != 0,
             "reverse": self._column("TORSION") == data.REVERSE,

@@ -135,7 +135,7 @@ def window_of(run: Simulation, section: float) -> Window:
     nonlinear = run.model == "nonlinear"
     at_first = [int(np.flatnonzero(panels == i)[0]) for i in range(edges.size)]
     stuck = nonlinear & (kinds[at_first, data.TORSION] == data.STUCK)
-    held = nonlinear & (kinds[at_first, data.AXIAL] == data.HELD)
+    held = nonlinear & np.isin(kinds[at_first, data.AXIAL], (data.HELD, data.RIDING))
     held &= kinds[at_first, data.CONTACT] == 1
     names = (*run.state_names, *run.input_names)
     since = max(section - 10.0 * run.structure.delay, 0.5 * float(run.times[-1]))

@@ -29,7 +29,7 @@ CLOSE = 0.2
 _ASTRAY = 1e-2
 _LARGEST_CLUSTER = 24
 # A count on a circle that is off by more is disturbed by a root close to it.
-_SHARP_COUNT = 1e-8
+_SHARP_COUNT = 1e-12
 # Relative rounding of a mean over the circle, at least.
 _LEAST_NOISE = 1e-14
 

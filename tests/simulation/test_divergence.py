@@ -9,7 +9,7 @@ import pytest
 
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import table1
-from drillctrl.simulation import layout
+from drillctrl.simulation import begin
 from drillctrl.simulation.controller import Controller
 from drillctrl.simulation.outcome import figures
 from drillctrl.simulation.run import simulate
@@ -56,7 +56,7 @@ def test_what_is_named_goes_on_growing(monkeypatch, rpm, rop, structure, K1, K2,
     named = kicked(where, 0.5, 0.5, controller, duration=100.0, rtol=rtol, cutting="single")
     assert named.status == "diverges"
     assert named.steps < 2000
-    monkeypatch.setattr(layout, "rate_bounds", lambda *_: np.full(4, np.inf))
+    monkeypatch.setattr(begin, "rate_bounds", lambda *_: np.full(4, np.inf))
     end = float(named.times[-1])
     further = kicked(where, 0.5, 0.5, controller, duration=3.0 * end, rtol=rtol, cutting="single")
     speeds = further.motion.dtheta, named.motion.dtheta

@@ -8,8 +8,8 @@ import pytest
 from drillctrl.base.errors import InputError
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.simulation import advance
+from drillctrl.simulation.begin import resized
 from drillctrl.simulation.controller import Controller
-from drillctrl.simulation.layout import resized
 from drillctrl.simulation.run import simulate
 from drillctrl.simulation.scenario import Change, Scenario
 from drillctrl.strings.presets import string_preset

@@ -53,6 +53,12 @@ def test_a_cluster_does_not_forget_those_that_were_resolved_before():
     assert sizes[0] == 5
 
 
+def test_a_double_root_is_found_to_rounding_with_neighbours_beside():
+    # The circle about it must not reach so far that those are felt.
+    system = agreement.random_system(72004414)
+    assert spectral_abscissa(system) == pytest.approx(-2408.205667269, rel=1e-8)
+
+
 def test_a_wrong_root_would_be_told(monkeypatch):
     system = DelaySystem([[-1.0]], ([[0.5]],), (1.0,))
     assert agreement.verdict(system, 1.0) == ("agrees", "")

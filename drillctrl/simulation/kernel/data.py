@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 
 # Torsion of the bit: Φ' > 0, held at Φ' = 0, Φ' < 0.
 FORWARD, STUCK, REVERSE = 0, 1, 2
-# Axial motion while in contact: Z' > 0, held at Z' = 0 by the wear flat, Z' < 0.
-DOWN, HELD, UP = 0, 1, 2
+# Axial motion while in contact: Z' > 0, held at Z' = 0 by the wear flat, Z' < 0; and on a face
+# that falls away, which the bit follows, pressed on it by less than all of the wear-flat force.
+DOWN, HELD, UP, RIDING = 0, 1, 2, 3
 
 # Events that are zeros of functions which are positive in the present mode.
 TORSION_RATE, RELEASE_FORWARD, RELEASE_REVERSE = 0, 1, 2

@@ -11,7 +11,6 @@ from .data import (
     BARRIER,
     BETWEEN,
     DEPTH,
-    DOWN,
     FORWARD,
     HELD,
     HELD_TO_DOWN,
@@ -29,12 +28,14 @@ from .data import (
     RELEASE_FORWARD,
     RELEASE_REVERSE,
     RESUME,
+    RIDING,
     SAMPLED,
     SCALE,
     STAGES,
     START,
     STUCK,
     TORSION_RATE,
+    UP,
 )
 from .interpolate import state_at
 from .jit import inner
@@ -65,10 +66,12 @@ def watched(settings, kind, mode):
         return mode.torsion == STUCK
     if kind == AXIAL_RATE:
         return mode.contact == 1 and mode.axial != HELD
+    if kind == DEPTH:
+        return mode.contact == 0 or mode.axial != RIDING
     if kind == RESUME:
         return mode.behind == 1 and mode.torsion == FORWARD
     if kind in (HELD_TO_UP, HELD_TO_DOWN):
-        return mode.contact == 1 and mode.axial == HELD
+        return mode.contact == 1 and (mode.axial == HELD or mode.axial == RIDING)
     return True
 
 
@@ -93,7 +96,7 @@ def value_of(kind, mode, probe, dx, dtheta, bit):
     axial_rate, rotary_rate = rates((0.0, dx, 0.0, dtheta), bit)
     if kind == TORSION_RATE:
         return rotary_rate if mode.torsion == FORWARD else -rotary_rate
-    return axial_rate if mode.axial == DOWN else -axial_rate
+    return -axial_rate if mode.axial == UP else axial_rate
 
 
 @inner

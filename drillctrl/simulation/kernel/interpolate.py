@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .data import (
     BEHIND,
     LAST_LEVEL,
@@ -37,6 +39,14 @@ def quintic_slope(c, n, j, s):
 
 
 @inner
+def quintic_curve(c, n, j, s):
+    """Second derivative in s of the quintic in row j."""
+    return 2.0 * c[j, n + 2] + s * (
+        6.0 * c[j, n + 3] + s * (12.0 * c[j, n + 4] + s * 20.0 * c[j, n + 5])
+    )
+
+
+@inner
 def quartic(c, n, j, s):
     """Value at s of the quartic whose coefficients start in column n of row j."""
     return c[j, n] + s * (c[j, n + 1] + s * (c[j, n + 2] + s * (c[j, n + 3] + s * c[j, n + 4])))
@@ -53,6 +63,24 @@ def state_at(history, j, s):
         quintic(c, THETA, j, s),
         quintic_slope(c, THETA, j, s) / h,
     )
+
+
+@inner
+def face_at(history, bit, j, s, rotary):
+    """How the rock face that was left on step j at s falls under a bit that turns at Φ'.
+
+    Returns
+    -------
+    rate, share, rest : float
+        Speed at which it falls, Z'(t − τ) Φ'/Φ'(t − τ); and its acceleration share Φ'' + rest.
+    """
+    c, h = history.real, history.real[j, LENGTH]
+    axial, turning = rates(state_at(history, j, s), bit)
+    if not turning > 0.0:
+        return np.inf, 0.0, np.inf
+    ratio, share = rotary / turning, axial / turning
+    curves = quintic_curve(c, X, j, s), quintic_curve(c, THETA, j, s)
+    return share * rotary, share, (curves[0] - share * curves[1]) * (ratio / h) ** 2
 
 
 @inner

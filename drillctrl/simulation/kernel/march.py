@@ -42,6 +42,7 @@ from .data import (
     RESUME,
     REVERSE,
     REVERSED,
+    RIDING,
     SIDES,
     STAGES,
     START,
@@ -57,7 +58,7 @@ from .model import lag_of, rate_of_change
 from .physics import rates
 from .side import hold_sides
 from .step import attempt, moving, record
-from .switch import next_mode, next_saturation, snap
+from .switch import next_mode, next_saturation, set_on_face, snap
 
 # Places in `ints` and `reals`, where the march is resumed from.
 (STEPS, I_CONTACT, I_TORSION, I_AXIAL, I_PASSES, I_LEVEL, PIECE, GAINS, ON, SAMPLE, STALLS,
@@ -115,6 +116,8 @@ def enter(settings, history, steps, ints, reals, chain, kind, t, y, work):
     if kind < AT_LIMIT:
         branch = next_mode(settings, history, steps, mode, kind, t, y, work)
         ints[I_CONTACT], ints[I_TORSION], ints[I_AXIAL] = branch
+        if branch[2] == RIDING:
+            set_on_face(settings, history, steps, mode, t, y)
         if branch[1] == REVERSE and ints[I_BEHIND] == 0:
             ints[I_BEHIND], reals[TURNED_T], reals[TURNED_THETA] = 1, t, y[2]
         mode = mode_of(ints, reals, chain)
@@ -177,6 +180,8 @@ def pass_angle_break(settings, history, steps, ints, reals, chain, following, wh
     """Move the lag in angle over the break that it has met; return the level this brings."""
     b, whole = following[which], settings.whole
     gain = 1 if whole[RATE_FEEDBACK] + whole[CURRENT_DELAY] == 2 else 2
+    if ints[I_AXIAL] == RIDING:
+        gain = 0
     level = passed_on(history.whole[b, LEVEL], gains_no_angle(history, b), gain)
     chain[which] = b
     tolerance = 2.0 * PASSED * turned_by(settings, t, theta)
@@ -351,7 +356,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         if kind >= 0:
             if where * h < SHORTEST * max(1.0, abs(t)):
                 # Negative from the start: no step, another mode.
-                snap(kind, y, bit)
+                snap(kind, mode, y, bit)
                 enter(settings, history, steps, ints, reals, chain, kind, t, y, work)
                 ints[I_LEVEL] = min(ints[I_LEVEL], level_of(settings, kind))
                 known = False
@@ -369,6 +374,8 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
         t = goal if at_goal else t + h
         for i in range(size):
             y[i] = new[i]
+        if mode.axial == RIDING:
+            set_on_face(settings, history, steps + 1, mode, t, y)
         steps, fresh = steps + 1, True
         ints[STEPS], reals[TIME] = steps, t
         level = pass_time_breaks(settings, history, steps, ints, following, t)
@@ -387,7 +394,7 @@ def march(settings, history, ints, reals, y, chain, following, end, max_step, tr
             if ints[GAINS] != gains:
                 seek_past(settings, history, steps, ints, following, t)
         if kind >= 0:
-            snap(kind, y, bit)
+            snap(kind, mode, y, bit)
             level = min(level, level_of(settings, kind))
         # The last stage is the first of the next step, unless something breaks there.
         known = level == NO_BREAK and reached < 0

@@ -43,17 +43,19 @@ from .data import (
     PIVOTS,
     QUARTIC,
     REVERSE,
+    RIDING,
     ROWS,
     SAMPLED,
     START,
     STATES,
     STUCK,
     TORQUE,
+    UP,
     WALL,
     WALL_HELD,
     WEIGHT,
 )
-from .interpolate import locate_angle, locate_time, pitch_of, quartic, state_at
+from .interpolate import face_at, locate_angle, locate_time, pitch_of, quartic, state_at
 from .jit import entry, inner
 from .law import load
 from .physics import depth, rates, turned
@@ -211,6 +213,40 @@ def feed_back(settings, history, steps, mode, t, y, place, out, probe):
 
 
 @inner
+def far_face(settings, history, steps, mode, t, theta):
+    """Step and place on it where the rock face was left that several passes have not reached."""
+    extra = (mode.passes - 1) * pitch_of(settings.bit)
+    return locate_angle(history, settings.bit, steps, mode.face, t, theta, extra)
+
+
+@inner
+def cutting_edges(bit):
+    """Depth of cut per unit of way: n, as all blades cut."""
+    zero = (0.0, 0.0, 0.0, 0.0)
+    return depth((1.0, 0.0, 0.0, 0.0), zero, 0.0, bit) - depth(zero, zero, 0.0, bit)
+
+
+@inner
+def above_face(settings, history, steps, mode, t, y):
+    """How far a bit that turns forward is in the rock, and how much faster it falls than the face.
+
+    Returns
+    -------
+    way, speed, fall : float
+        ``fall`` is the speed of the face.
+    """
+    bit, state = settings.bit, (y[0], y[1], y[2], y[3])
+    j, s = locate_angle(history, bit, steps, mode.lag, t, y[2], 0.0)
+    if mode.passes > 1:
+        j, s = far_face(settings, history, steps, mode, t, y[2])
+    since = t - history.real[j, START] - s * history.real[j, LENGTH]
+    axial, rotary = rates(state, bit)
+    fall = face_at(history, bit, j, s, rotary)[0]
+    way = depth(state, state_at(history, j, s), since, bit) / cutting_edges(bit)
+    return way, axial - fall, fall
+
+
+@inner
 def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     """Right-hand side on one branch; False if a delayed instant lies beyond the history.
 
@@ -240,10 +276,12 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     place = t - delay, j, s
     since = delay
     if mode.passes > 1:
-        extra = (mode.passes - 1) * pitch_of(bit)
-        j, s = locate_angle(history, bit, steps, mode.face, there, theta, extra)
+        j, s = far_face(settings, history, steps, mode, there, theta)
         since = t - history.real[j, START] - s * history.real[j, LENGTH]
     d = depth(state, state_at(history, j, s), since, bit)
+    face = 0.0, 0.0, 0.0
+    if mode.axial == RIDING:
+        face = face_at(history, bit, j, s, rates(state, bit)[1])
     strength = 1.0
     if settings.drive.shape[0] > 1:
         moved, top = top_at(settings.drive, mode.piece, t), n + 3 * settings.whole[INPUTS]
@@ -259,12 +297,13 @@ def rate_of_change(settings, history, steps, mode, t, y, out, probe):
     weight, torque = bit_load(
         axial,
         angular,
-        strength * d,
+        0.0 if mode.axial == RIDING else strength * d,
         rates(state, bit),
         mode.contact,
         mode.torsion,
         mode.axial,
         mode.behind,
+        face,
         settings.real,
         settings.law,
         probe,
@@ -297,10 +336,13 @@ def move(settings, y, out):
 
 
 @entry
-def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, real, law, probe):
+def bit_load(
+    axial, angular, cut, speeds, contact, torsion, direction, behind, face, real, law, probe
+):
     """Weight and torque on bit, with the set-valued loads of Φ' = 0 and Z' = 0 resolved.
 
-    At Z' = 0 the share of the wear-flat force is the one that holds the bit; at Φ' = 0 the
+    At Z' = 0 the share of the wear-flat force is the one that holds the bit, and on a face that
+    it rides on the one with which it falls as that does (Filippov); at Φ' = 0 the
     torque is, and the cutters press as for Φ' > 0, since H(0) = 1 (Eq. 5). Behind the furthest
     angle that the bit has reached they rest on the rock with that weight, and bear no torque.
     The bit's part of the string rubs on the wall as the wear flat does on the rock.
@@ -315,10 +357,13 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
         Z' and Φ'.
     contact, torsion, direction, behind : int
         The mode; ``direction`` is the axial one.
+    face : tuple
+        As of `face_at`, where the bit rides on it.
     real, law : array, tuple
         As in `Settings`.
     probe : array
-        Takes the loads of the rock, and the accelerations at the ends of what they can be.
+        Takes the loads of the rock, and the accelerations at the ends of what they can be, on a
+        face that the bit rides on those from it.
 
     Returns
     -------
@@ -338,11 +383,14 @@ def bit_load(axial, angular, cut, speeds, contact, torsion, direction, behind, r
             light = load((cut, 0.0, 1.0), speeds, law)[0], load((0.0, 0.0, sign), speeds, law)[1]
             full = load((cut, 1.0, 1.0), speeds, law)[0], load((0.0, 1.0, sign), speeds, law)[1]
         up, down = axial + by_weight * light[0], axial + by_weight * full[0]
+        if direction == RIDING:
+            up -= face[1] * (angular + by_torque * (wall + light[1])) + face[2]
+            down -= face[1] * (angular + by_torque * (wall + full[1])) + face[2]
         probe[P_UP], probe[P_DOWN] = up, down
         if direction == DOWN:
             pressed = 1.0
             weight, torque = full
-        elif direction == HELD:
+        elif direction != UP:
             pressed = up / (up - down) if up != down else 0.0
             weight = light[0] + pressed * (full[0] - light[0])
             torque = light[1] + pressed * (full[1] - light[1])

@@ -31,6 +31,7 @@ from .data import (
     P_WEIGHT,
     PASSES,
     PIVOTS,
+    RIDING,
     SATURATED,
     SIDES,
     SINCE,
@@ -112,6 +113,8 @@ def evaluate(settings, history, steps, places, times, wanted):
                 y[1] = -standing[0]
         if not stored:
             rate_of_change(settings, history, steps, mode, t, y, out, probe)
+            if mode.axial == RIDING:
+                probe[P_DEPTH] = 0.0
         if linear and not stored:
             speeds = rates((y[0], y[1], y[2], y[3]), settings.bit)
             probe[P_WEIGHT], probe[P_TORQUE] = load(

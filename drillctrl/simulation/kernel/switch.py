@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .data import (
     AT_LIMIT,
     AXIAL_RATE,
     BARRIER,
     BEGIN,
+    CUT,
     DEPTH,
     DOWN,
     FEEDBACK,
@@ -25,6 +28,8 @@ from .data import (
     RELEASE_FORWARD,
     RELEASE_REVERSE,
     REVERSE,
+    RIDING,
+    RTOL,
     SAMPLED,
     SCALE,
     STAGES,
@@ -35,7 +40,7 @@ from .data import (
 )
 from .events import watched
 from .jit import inner
-from .model import rate_of_change
+from .model import above_face, cutting_edges, rate_of_change
 from .physics import rates
 
 
@@ -63,13 +68,41 @@ def with_branch(mode, contact, torsion, axial):
 
 
 @inner
-def snap(kind, y, bit):
+def snap(kind, mode, y, bit):
     """Make a velocity that has just been found to vanish vanish exactly."""
     zero = rates((0.0, 0.0, 0.0, 0.0), bit)
-    if kind == AXIAL_RATE:
-        y[1] = -zero[0]
-    elif kind == TORSION_RATE:
+    if kind == TORSION_RATE:
         y[3] = -zero[1]
+    # A face falls only under a bit that turns.
+    if kind == AXIAL_RATE or (kind == TORSION_RATE and mode.axial == RIDING):
+        y[1] = -zero[0]
+
+
+@inner
+def set_on_face(settings, history, steps, mode, t, y):
+    """Put a bit that rides on the face where that is, at its speed."""
+    way, faster, _ = above_face(settings, history, steps, mode, t, y)
+    y[0] -= way
+    y[1] -= faster
+
+
+@inner
+def rides(settings, history, steps, mode, t, y, work):
+    """Whether a bit at the face follows it: it falls away, and what is left are no bounces.
+
+    Between none and all of the wear-flat force the bit has to come back to the face from either
+    side. Bounces that are lower than the tolerance times the depth of cut are none.
+    """
+    _, faster, fall = above_face(settings, history, steps, mode, t, y)
+    if not 0.0 < fall < np.inf:
+        return False
+    trial, probe = with_branch(mode, 1, FORWARD, RIDING), work.stages[STAGES]
+    rate_of_change(settings, history, steps, trial, t, y, work.rates[STAGES], probe)
+    least = min(probe[P_UP], -probe[P_DOWN])
+    height = settings.real[RTOL] * settings.real[CUT] / cutting_edges(settings.bit)
+    return (
+        least > 1e-12 * settings.real[SCALE + HELD_TO_UP] and faster * faster < 2.0 * least * height
+    )
 
 
 @inner
@@ -99,7 +132,7 @@ def next_mode(settings, history, steps, mode, kind, t, y, work):
 
     At Φ' = 0 the bit stays if the torque offered lies between what full friction (and
     cutting) can bear in either direction, else it goes where it is pushed. Z' = 0 likewise,
-    with a wear-flat force anywhere in [0, λ].
+    with a wear-flat force anywhere in [0, λ]; and at the face, see `rides`.
     """
     if settings.whole[LINEAR] == 1:
         return 1, FORWARD, DOWN
@@ -111,8 +144,11 @@ def next_mode(settings, history, steps, mode, kind, t, y, work):
     )
     contact, torsion, axial = mode.contact, mode.torsion, mode.axial
     at_rest = torsion == STUCK or kind == TORSION_RATE or rotary_rate == 0.0
+    at_face = kind == DEPTH
     if kind == DEPTH:
         contact = 1 - contact
+    elif kind == HELD_TO_UP and axial == RIDING:
+        contact = 0
     elif kind in (BARRIER, BEGIN):
         rate_of_change(settings, history, steps, mode, t, y, out, probe)
         tolerance = 1e-11 * settings.real[SCALE + DEPTH]
@@ -120,6 +156,11 @@ def next_mode(settings, history, steps, mode, kind, t, y, work):
             contact = 0
         elif probe[P_DEPTH] > tolerance:
             contact = 1
+        else:
+            at_face = True
+    turns = not at_rest and rotary_rate > 0.0 and mode.behind == 0
+    if at_face and turns and rides(settings, history, steps, mode, t, y, work):
+        return 1, FORWARD, RIDING
     level = axial_rate == 0.0 or (mode.contact == 1 and axial == HELD)
     if contact == 0:
         axial = DOWN
