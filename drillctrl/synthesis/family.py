@@ -245,7 +245,7 @@ class LoopFamily:
         Samples on a wider circle would take det Δ for another function.
         """
         longest = max([*self.plain.delays, *self.lags.tolist()], default=0.0)
-        return np.asarray(np.minimum(0.1 * (1.0 + np.abs(s)), 1.0 / (longest or 1.0)))
+        return np.asarray(np.minimum(0.1 * (1.0 + np.abs(s)), 4.0 / (longest or 1.0)))
 
     def seen_at(self, s: ComplexArray) -> ComplexArray:
         """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""

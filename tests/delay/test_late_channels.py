@@ -30,7 +30,9 @@ from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
-from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.active import ActiveDesign
+from drillctrl.synthesis.family import ActiveRoot, loop_family
+from drillctrl.synthesis.search import _holds
 
 S = np.array([0.3 + 0.7j, -0.4 + 2.0j, 1.1 - 3.0j])
 
@@ -258,6 +260,17 @@ def test_a_late_input_before_six_other_delays(exchanger):
     assert response[..., 0] == pytest.approx(expected, rel=1e-12)
     loop = loop_transfer(plant, structure, gains, None, np.array([0.05]))
     assert loop[0, 0, 0] == pytest.approx(-(gains @ expected)[0, 0], rel=1e-12)
+
+
+def test_roots_that_coincide_are_no_optimum_where_others_lie_right_of_them(exchanger):
+    """Six roots meet at −0.0737, which shows them to 0.005, and a pair lies at −0.048 ± 0.23i."""
+    plant, *_ = exchanger
+    family = loop_family(plant, feedback(1, 5, late=0.0))
+    gains = np.array([-0.19392818, 1.03765537, -3.4039846, -2.90944452, 0.09222856])
+    meant = ActiveDesign(gains, -0.0736985, (ActiveRoot(0.0, 6),), 0.0, 0)
+    value = family.exact(gains)
+    assert value == pytest.approx(-0.048016, abs=1e-6)
+    assert not _holds(family, meant, value)
 
 
 @pytest.mark.long
