@@ -17,6 +17,8 @@ from drillctrl.simulation.structure import structure_of
 
 POINT = OperatingPoint(8.0, 1.5, 1.0, lam=20.0, beta=0.3)
 SHARE, STIFFNESS = 0.01, 51.2
+# Closed Newton-Cotes weights on nine points.
+BOOLE = np.array([989, 5888, -928, 10496, -4540, 10496, -928, 5888, 989]) / 28350.0
 TIMES = np.linspace(0.0, 0.5, 501)
 
 
@@ -116,6 +118,27 @@ def test_it_is_the_limit_of_a_wear_flat_that_takes_hold_by_depth():
     few, fewer = np.array(apart)
     assert few / fewer == pytest.approx(10.0, rel=0.02)
     assert (fewer < [1e-3, 1e-3, 1e-4]).all()
+
+
+def test_energy_balance(run):
+    motion, c = run.on_steps(9), structure_of(light_bit())._c
+    weight, torque = run.steady_load
+    power = motion.dx * (weight - motion.weight_on_bit)
+    power += motion.dtheta * (torque - motion.torque_on_bit)
+    power -= 5.0 * (motion.dx - motion.dcollar) ** 2 + c.axial_damping * motion.dcollar**2
+    power -= c.torsional_damping * motion.dtheta**2
+    # The last bounce before that it rides is cut short, and its momentum with it.
+    since = run.times[:-1] >= run.phases("riding")[0][0]
+    ends = run.at([run.times[:-1][since][0], run.times[-1]])
+    energy = SHARE * ends.dx**2 + (1.0 - SHARE) * ends.dcollar**2 + ends.dtheta**2
+    energy += STIFFNESS * (ends.x - ends.collar) ** 2 + c.axial_stiffness * ends.collar**2
+    energy = 0.5 * (energy + ends.theta**2)
+
+    def integral(values):
+        return float((values.reshape(-1, 9) @ BOOLE * np.diff(run.times))[since].sum())
+
+    size = integral(abs(power))
+    assert integral(power) == pytest.approx(energy[1] - energy[0], abs=1e-8 * size)
 
 
 def test_tolerance_says_how_small_a_bounce_is_none(run):
