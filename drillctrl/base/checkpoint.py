@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from drillctrl.base.errors import InputError
-from drillctrl.base.files import check_regular, replacing
+from drillctrl.base.files import check_regular, lock, replacing
 from drillctrl.base.kinds import makes_of_kinds
 
 _MOST_BYTES = 4_000_000_000
@@ -37,40 +37,52 @@ class Checkpoint:
     Raises
     ------
     InputError
-        If the file cannot be read or written, or is no checkpoint of the same code and libraries:
-        it is left as it is.
+        If the file cannot be read or written, is no checkpoint of the same code and libraries,
+        or another process is at it: it is left as it is.
     """
 
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self._known: dict[str, dict[str, Any]] = {}
         self._used: set[str] = set()
-        header = _header()
         try:
             if self._path.exists():
                 check_regular(self._path, _MOST_BYTES)
             self._file = self._path.open("a+b")
-            self._file.seek(0)
-            first = self._file.readline()
-            # A kill may have cut the first line short.
-            if not header.startswith(first):
-                self._file.close()
-                raise InputError("checkpoint", str(path), f"a checkpoint of {_own()}")
-            if first != header:
-                self._file.truncate(0)
-                self._file.write(header)
-                self._file.flush()
-                return
-            kept = len(first)
-            for line in self._file:
-                entry = _read_line(line)
-                if entry is None:
-                    break
-                self._known[entry["task"]] = entry["result"]
-                kept += len(line)
-            self._file.truncate(kept)
         except OSError as error:
             raise self._refused(error) from None
+        try:
+            if not lock(self._file):
+                raise InputError("checkpoint", str(path), "one that no other run is at")
+            self._take_up()
+        except InputError:
+            self._file.close()
+            raise
+        except OSError as error:
+            self.close()
+            raise self._refused(error) from None
+
+    def _take_up(self) -> None:
+        """Read what is there, and cut off what is not whole."""
+        header = _header()
+        self._file.seek(0)
+        first = self._file.readline()
+        # A kill may have cut the first line short.
+        if not header.startswith(first):
+            raise InputError("checkpoint", str(self._path), f"a checkpoint of {_own()}")
+        if first != header:
+            self._file.truncate(0)
+            self._file.write(header)
+            self._file.flush()
+            return
+        kept = len(first)
+        for line in self._file:
+            entry = _read_line(line)
+            if entry is None:
+                break
+            self._known[entry["task"]] = entry["result"]
+            kept += len(line)
+        self._file.truncate(kept)
 
     def __enter__(self) -> Checkpoint:
         return self

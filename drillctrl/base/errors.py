@@ -110,8 +110,7 @@ def checked_number(
         If ``value`` is not a finite real number in the interval.
     """
     if isinstance(value, numbers.Real) and not isinstance(value, bool):
-        # −0 is 0.
-        value = number = float(value) + 0.0
+        value = number = _as_float(value)
         if low <= number <= high and math.isfinite(number) and not (open_low and number == low):
             return number
     permitted = interval_text(low, high, open_low=open_low)
@@ -132,7 +131,15 @@ def checked_integer(parameter: str, value: object, low: int, high: int) -> int:
     permitted = f"a whole number in [{low}, {high}]"
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise InputError(parameter, value, permitted)
-    number = float(value)
+    number = _as_float(value)
     if not math.isfinite(number) or number != int(number) or not low <= number <= high:
         raise InputError(parameter, value, permitted)
     return int(number)
+
+
+def _as_float(value: numbers.Real) -> float:
+    """Return a number as a float: −0 as 0, a whole number without a float as infinite."""
+    try:
+        return float(value) + 0.0
+    except OverflowError:
+        return math.inf

@@ -45,9 +45,12 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
     Raises
     ------
     OSError
-        If the folder does not exist, cannot be written to, or is full.
+        If the folder does not exist, cannot be written to, or is full, or a file that is there
+        may not be written; it names ``path``.
     """
     target = Path(path)
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     descriptor, name = tempfile.mkstemp(
         prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent
     )
@@ -60,10 +63,28 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
         os.umask(umask)
         os.chmod(name, 0o666 & ~umask)
         os.replace(name, target)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             os.unlink(name)
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(path), None
         raise
+
+
+def lock(file: IO[bytes]) -> bool:
+    """Keep a file for this process until it is closed; return False where another has it.
+
+    Systems and file systems without such locks let everyone have it.
+    """
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):
+        pass
+    return True
 
 
 def write_text(path: str | Path, text: str) -> None:

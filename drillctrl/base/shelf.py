@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,10 +31,22 @@ class Shelf:
         Made when something is kept.
     classes : mapping
         Name → class of what is kept.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
     """
 
     folder: str | Path
     classes: dict[str, type[Any]]
+
+    def __post_init__(self) -> None:
+        nearest = Path(self.folder).absolute()
+        while not nearest.exists():
+            nearest = nearest.parent
+        if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
+            raise InputError("keep", str(self.folder), "a folder that can be written")
 
     def get(self, depends: tuple[Any, ...], compute: Callable[[], Kept]) -> Kept:
         """Return what is kept for a key, or compute and keep it.

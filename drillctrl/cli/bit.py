@@ -226,7 +226,9 @@ def _along(
 def _read_frequency(text: str, where: Any) -> float:
     """Return a dimensionless angular frequency from Hz of a rig, or from a number."""
     from drillctrl.drilling.case import as_case
+    from drillctrl.motion.response import FREQUENCIES
 
+    low, high = FREQUENCIES
     rig = as_case(where).rig
     number, _, unit = text.strip().partition(" ")
     per_unit = {"Hz": 2.0 * math.pi, "mHz": 2e-3 * math.pi, "rad/s": 1.0}.get(unit.strip())
@@ -235,13 +237,14 @@ def _read_frequency(text: str, where: Any) -> float:
     except ValueError:
         value = math.nan
     if rig is None:
-        if unit or not 0.0 < value <= 1e3:
-            wanted = "a number ω in (0, 1000], or a rig to go with its unit"
+        if unit or not low <= value <= high:
+            wanted = f"a number ω in [{low:g}, {high:g}], or a rig to go with its unit"
             raise InputError("--frequency", text, wanted)
         return value
-    if per_unit is None or not 0.0 < value * per_unit * rig.time_scale <= 1e3:
-        most = 1e3 / (2.0 * math.pi * rig.time_scale)
-        wanted = f"a frequency with its unit, such as '0.45 Hz' or '2.83 rad/s', to {most:.3g} Hz"
+    if per_unit is None or not low <= value * per_unit * rig.time_scale <= high:
+        least, most = (end / (2.0 * math.pi * rig.time_scale) for end in FREQUENCIES)
+        between = f"from {least:.3g} to {most:.3g} Hz"
+        wanted = f"a frequency with its unit, such as '0.45 Hz' or '2.83 rad/s', {between}"
         raise InputError("--frequency", text, wanted)
     return value * per_unit * rig.time_scale
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -22,6 +23,7 @@ _OF_THE_LOOP = (
 )
 # A number and a unit: 1e12 is no 1 of a unit e12.
 _TYPED = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?![eE][-+]?\d+\s*$)([A-Za-z'\"].*?)\s*")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE]\+?\d+)?")
 # Numbers of a rig's point → the options that they are typed with.
 _OF_THE_RIG = {"rotary_speed": "--speed", "penetration_rate": "--rop", "weight_on_bit": "--wob"}
 
@@ -67,6 +69,15 @@ class Verb(click.Command):
         names = [parameter.name for parameter in self.params]
         if "rig" in names and "as_json" in names:
             self.params.insert(names.index("as_json"), _verbose_option())
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read what was typed, but for numbers that would be read as infinite."""
+        for before, text in zip(["", *args], args, strict=False):
+            option, value = text.split("=", 1) if re.match(r"--[\w-]+=", text) else (before, text)
+            for piece in re.split(r"[,:;=\s]", value):
+                if _NUMBER.fullmatch(piece) and math.isinf(float(piece)):
+                    raise InputError(option, value, f"of numbers up to {sys.float_info.max:.2g}")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""

@@ -12,6 +12,7 @@ import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 
 # Rows and columns whose sums differ by more than this are scaled.
 _UNBALANCED = 1e3
@@ -20,7 +21,7 @@ _UNBALANCED = 1e3
 def _matrix(name: str, value: npt.ArrayLike, shape: tuple[int | None, int | None]) -> FloatArray:
     try:
         matrix = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(name, type(value).__name__, "a matrix of numbers") from None
     rows, columns = shape
     if (
@@ -49,6 +50,7 @@ def _in_order(
     return a0, tuple(matrices), tuple(matrices.values())
 
 
+@makes_of_kinds
 @dataclass(frozen=True, eq=False)
 class DelaySystem:
     """A linear time-invariant system of retarded type, with delays at its inputs and outputs too.

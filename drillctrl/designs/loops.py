@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, checked_integer
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.closing import feedback_lags, loop_channels
 from drillctrl.delay.structure import FeedbackStructure
@@ -56,11 +56,17 @@ def spectral_abscissas(
         than one delay.
     """
     case = as_case(point)
+    if workers is not None:
+        workers = checked_integer("workers", workers, 1, 1000)
     varied = {name: np.atleast_1d(np.asarray(v, float)) for name, v in (parameters or {}).items()}
     vectors = None
     if structure is not None:
         vectors = np.atleast_2d(np.asarray(gains, dtype=float))
-        if vectors.shape[1] != structure.lower.size or not np.isfinite(vectors).all():
+        if (
+            vectors.ndim != 2
+            or vectors.shape[1] != structure.lower.size
+            or not np.isfinite(vectors).all()
+        ):
             raise InputError(
                 "gains",
                 f"array of shape {vectors.shape}",

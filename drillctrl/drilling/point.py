@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from drillctrl.base.errors import InputError, checked_integer, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.base.language import LANGUAGES, Language, language_named
 from drillctrl.drilling.rig import Rig
 
@@ -90,6 +91,7 @@ class OperatingPoint:
         return replace(self, **changes)
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class RigPoint:
     """A rig at the rotary speed and penetration rate imposed at its top end.

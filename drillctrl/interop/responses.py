@@ -12,7 +12,12 @@ from drillctrl.base.extras import required
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
-from drillctrl.robustness.transfer import frequency_grid, frequency_response, loop_transfer
+from drillctrl.robustness.transfer import (
+    frequencies,
+    frequency_grid,
+    frequency_response,
+    loop_transfer,
+)
 
 # What is smaller is left out at high frequencies: gain margins are looked for up to its inverse.
 _SMALL = 1e-4
@@ -39,13 +44,14 @@ def to_frd(
     """
     control = required("control", "control")
 
-    grid = frequency_grid(system) if omega is None else np.asarray(omega, dtype=float)
+    grid = frequency_grid(system) if omega is None else frequencies(omega)
+    response = frequency_response(system, grid)
     return control.frd(
-        frequency_response(system, grid),
+        response,
         grid,
         inputs=list(system.input_names),
         outputs=list(system.output_names),
-        smooth=_is_siso(system),
+        smooth=_is_smooth(response),
     )
 
 
@@ -69,16 +75,18 @@ def loop_frd(
     if omega is None:
         grid = frequency_grid(system, response=transfer, small=_SMALL)
     else:
-        grid = np.asarray(omega, dtype=float)
-    names = list(structure.inputs)
+        grid = frequencies(omega)
+    names, response = list(structure.inputs), transfer(grid)
     return control.frd(
-        transfer(grid),
+        response,
         grid,
         inputs=names,
         outputs=[f"{name}_demanded" for name in names],
-        smooth=len(names) == 1,
+        smooth=_is_smooth(response),
     )
 
 
-def _is_siso(system: DelaySystem) -> bool:
-    return bool(system.B.shape[1] == 1 and system.C.shape[0] == 1)
+def _is_smooth(response: ComplexArray) -> bool:
+    """Whether a curve is drawn through the points: of one channel, with no pole among them."""
+    one = response.shape[:2] == (1, 1) and response.shape[2] > 1
+    return bool(one and np.isfinite(response).all())

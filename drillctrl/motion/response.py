@@ -26,6 +26,8 @@ from drillctrl.simulation.status import Outcome, Status
 
 # H is told to this, in units of sqrt(I Kt), unless it takes too long.
 TOLERANCE = 3e-3
+# Dimensionless: what is slower takes more than 1e6 units of time, what is faster no steps.
+FREQUENCIES = (1e-4, 1e3)
 MOST_PERIODS, FEWEST_PERIODS = 400, 40
 # Axial kicks, over the rate of penetration, from which the orbit is reached: out of smooth
 # drilling, and off the rock.
@@ -151,7 +153,7 @@ def bit_response(
     where : OperatingPoint, RigPoint or Case
         What drills, and where.
     frequency : float
-        ω > 0, dimensionless.
+        ω in `FREQUENCIES`, dimensionless.
     amplitude : float
         A in (0, 1): the bit does not turn back.
     tolerance : float
@@ -179,7 +181,7 @@ def bit_response(
         If an argument is out of its range, there is no plant, or its axial and torsional
         motion are coupled elsewhere than at the bit.
     """
-    frequency = checked_number("frequency", frequency, 0.0, 1e3, open_low=True)
+    frequency = checked_number("frequency", frequency, *FREQUENCIES)
     amplitude = checked_number("amplitude", amplitude, 0.0, 0.999, open_low=True)
     tolerance = checked_number("tolerance", tolerance, 0.0, 1e6, open_low=True)
     most_periods = checked_integer("most_periods", most_periods, FEWEST_PERIODS, 1_000_000)

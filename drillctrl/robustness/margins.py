@@ -11,7 +11,7 @@ import scipy.linalg
 import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import crossings
@@ -149,6 +149,7 @@ def parameter_margin(
     if alpha(0.0) >= 0.0:
         raise InputError("loop", "unstable at the nominal value", "stable")
     several = abscissas or one_by_one
+    points = checked_integer("points", points, 1, 100_000)
     down = -np.linspace(0.0, 1.0, points + 1)[:-1]
     up = np.linspace(0.0, top, points + 1)
     lower, upper = (_first_unstable(alpha, several, errors) for errors in (down, up))

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.optimize
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.system import DelaySystem
 from drillctrl.robustness.axis import AxisMinimum, line_minimum, weighted_minimum
@@ -121,6 +121,7 @@ def real_stability_radius(
     guaranteed, so the lower bound is −inf.
     """
     w = _weights(system, weights)
+    points = checked_integer("points", points, 2, 100_000)
     if spectral_abscissa(system) >= 0.0:
         return StabilityRadius(0.0, -math.inf, math.nan)
     delays = np.array((0.0, *system.delays))[w > 0.0]
@@ -173,7 +174,7 @@ def pseudospectral_abscissa(
     to line, by the maximum principle, and so do the weights: bisection finds the line on
     which σ_min(Δ) first reaches ε Σ wi exp(−Re s τi).
     """
-    size = checked_number("epsilon", epsilon, 0.0)
+    size = checked_number("epsilon", epsilon, 0.0, 1e100)
     w = _weights(system, weights)
     alpha = spectral_abscissa(system)
     if size == 0.0:
@@ -184,6 +185,9 @@ def pseudospectral_abscissa(
         return float(line_minimum(system, line, 1e-2).value - size * allowed)
 
     low, high = alpha, alpha + size * float(w.sum()) + 1e-9
+    if excess(low + 1e-13) >= 0.0:
+        # Perturbations of this size are lost in rounding.
+        return alpha
     while excess(high) < 0.0:
         low, high = high, alpha + 2.0 * (high - alpha)
     return float(scipy.optimize.brentq(excess, low + 1e-13, high, xtol=1e-11))

@@ -41,9 +41,7 @@ def frequency_response(system: DelaySystem, omega: npt.ArrayLike) -> ComplexArra
     array, (p, m, q)
         Outputs by inputs by frequencies; infinite at a pole.
     """
-    points = np.atleast_1d(np.asarray(omega, dtype=float))
-    if not np.isfinite(points).all():
-        raise InputError("omega", "an array with NaN or infinity", "finite")
+    points = frequencies(omega)
     lags = np.add.outer(system.output_delays, system.input_delays)
     turned = np.exp(-1j * np.multiply.outer(points, lags))
     return _by_frequency(turned * (system.C @ _responses(system, system.B, points)))
@@ -78,10 +76,20 @@ def loop_transfer(
     """
     gains = np.stack(gain_matrices(structure, K1, K2))
     drive, measure = loop_channels(system, structure)
-    points = np.atleast_1d(np.asarray(omega, dtype=float))
+    points = frequencies(omega)
     turned = np.exp(-1j * np.multiply.outer(points, feedback_lags(system, structure)))
     transfer = -(gains * turned).sum(axis=1) @ measure @ _responses(system, drive, points)
     return _by_frequency(transfer)
+
+
+def frequencies(omega: npt.ArrayLike) -> FloatArray:
+    """Return angular frequencies as a row, or raise if they are none or not finite."""
+    points = np.atleast_1d(np.asarray(omega, dtype=float))
+    if points.ndim != 1 or points.size == 0:
+        raise InputError("omega", f"array of shape {points.shape}", "a row of frequencies")
+    if not np.isfinite(points).all():
+        raise InputError("omega", "an array with NaN or infinity", "finite")
+    return points
 
 
 def _responses(system: DelaySystem, drive: FloatArray, omega: FloatArray) -> ComplexArray:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
+from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.delay.reduced import ReducedLoops, reduced
 from drillctrl.delay.system import DelaySystem
@@ -92,7 +93,14 @@ def count_right_of(system: DelaySystem, line: float) -> RootCount:
         Any.
     line : float
         Re s of the line.
+
+    Raises
+    ------
+    InputError
+        If ``line`` is no number.
     """
+    if math.isnan(line):
+        raise InputError("line", line, "a number")
     bound = magnitude_bound(system, line)
     small = is_small(system.order, bound * system.max_delay)
     result = follow(_SmallLoop(system) if small else reduced(system), line, bound).result

@@ -78,7 +78,7 @@ def prove_count(system: DelaySystem, line: float, most: int = _MAX_SEGMENTS) -> 
     its remainder, must have a positive real part; then both halves turn by less than a
     quarter, and their principal arguments add up to the true change.
     """
-    checked_number("line", line)
+    line = checked_number("line", line)
     flint = required("flint", "proof")
     began = time.perf_counter()
     old, flint.ctx.prec = flint.ctx.prec, PRECISION

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from drillctrl.base.errors import InputError
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.strings.catalogue import INCH, pipe
 from drillctrl.strings.drill_string import Damping, DrillString
@@ -27,6 +28,8 @@ _ROCK: dict[str, Any] = {
 def string_preset(name: str) -> StringRig:
     """Return a rig with a real string by name, one of `PRESETS`."""
     makers = dict(zip(PRESETS, (paper_string, vertical_3000, deep_5000), strict=True))
+    if name not in makers:
+        raise InputError("name", name, f"one of {', '.join(PRESETS)}")
     return makers[name]()
 
 

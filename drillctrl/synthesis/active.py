@@ -163,6 +163,7 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
     lower, upper = task.family.feedback.lower, task.family.feedback.upper
     lowest = u[k] - _DEEPEST * (1.0 + abs(u[k]))
     near = _ON_BOUND * (upper - lower)
+    scale = task.units
     held = np.zeros(u.size, dtype=bool)
     for bound in (lower, upper):
         on_bound = np.abs(u[:k] - bound) <= near
@@ -170,6 +171,7 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
         held[:k] |= on_bound
     for used in range(1, 1 + _NEWTON_STEPS):
         value, jacobian = task.values(u)
+        jacobian = jacobian * scale
         if not (np.isfinite(value).all() and np.isfinite(jacobian).all()):
             # Determinants of many states overflow far from where the search began.
             return None, used
@@ -188,17 +190,17 @@ def _newton(task: Conditions) -> tuple[FloatArray | None, int]:
         change = along @ scipy.linalg.solve_triangular(r, -value, trans=1)
         least = 0.0
         if basis.shape[1]:
-            hessian = task.curvature(u, multipliers)[np.ix_(free, free)]
+            hessian = (task.curvature(u, multipliers) * np.outer(scale, scale))[np.ix_(free, free)]
             curvatures, vectors = np.linalg.eigh(basis.T @ hessian @ basis)
             least = float(curvatures[0])
             slope = vectors.T @ basis.T @ (gradient[free] + hessian @ change)
             floor = 1e-8 * max(1.0, float(np.abs(curvatures).max()))
             change = change - basis @ vectors @ (slope / np.maximum(np.abs(curvatures), floor))
-        size = float(np.abs(change / (1.0 + np.abs(u[free]))).max())
+        size = float(np.abs(change / (1.0 + np.abs((u / scale)[free]))).max())
         if not np.isfinite(size):
             return None, used
         step = np.zeros(u.size)
-        step[free] = change * min(1.0, _LARGEST_STEP / max(size, _LARGEST_STEP))
+        step[free] = scale[free] * change * min(1.0, _LARGEST_STEP / max(size, _LARGEST_STEP))
         # A step ends where the first gain meets its bound, which then holds it.
         room = np.where(step[:k] > 0.0, upper - u[:k], lower - u[:k])
         ratios = np.full(k, np.inf)
@@ -241,20 +243,22 @@ def _sequential(task: Conditions) -> tuple[FloatArray, int]:
     paired = task.start.size - k - 1
     # Far below, other roots than those of the configuration are rightmost.
     lowest = task.start[k] - _DEEPEST * (1.0 + abs(task.start[k]))
-    bounds = [*zip(feedback.lower, feedback.upper, strict=True), (lowest, None)]
+    scale = task.units
+    ends = zip(feedback.lower / scale[:k], feedback.upper / scale[:k], strict=True)
+    bounds = [*ends, (lowest, None)]
     result = scipy.optimize.minimize(
         lambda u: float(u[k]),
-        task.start,
+        task.start / scale,
         jac=lambda u: gradient,
         bounds=[*bounds, *[(1e-9, None)] * paired],
         constraints={
             "type": "eq",
-            "fun": lambda u: values(u)[0],
-            "jac": lambda u: values(u)[1],
+            "fun": lambda u: values(scale * u)[0],
+            "jac": lambda u: values(scale * u)[1] * scale,
         },
         method="SLSQP",
         options={"maxiter": _SEQUENTIAL_STEPS, "ftol": 1e-13},
     )
-    u = np.asarray(result.x)
+    u = scale * np.asarray(result.x)
     u[:k] = np.clip(u[:k], feedback.lower, feedback.upper)
     return u, count[0]

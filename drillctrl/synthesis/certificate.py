@@ -73,7 +73,8 @@ def certify_optimality(
     else:
         method = "Clarke subdifferential"
         gradients, roots = family.active_gradients(gains)
-        stationarity = shortest_combination(gradients, normals)
+        # Of gains in the units of narrow bounds.
+        stationarity = shortest_combination(gradients * np.minimum(upper - lower, 1.0), normals)
     names = family.feedback.gain_names
     return OptimalityCertificate(
         method,
@@ -110,7 +111,7 @@ def _lagrange(
 ) -> float:
     """Return the smallest violation of the first-order conditions over all multipliers."""
     task = conditions(family, gains, abscissa, roots)
-    jacobian = task.values(task.start)[1]
+    jacobian = task.values(task.start)[1] * task.units
     jacobian = jacobian / np.linalg.norm(jacobian, axis=1, keepdims=True)
     size = jacobian.shape[1]
     padded = [np.concatenate([n, np.zeros(size - gains.size)]) for n in normals]

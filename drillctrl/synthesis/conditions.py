@@ -43,6 +43,14 @@ class Conditions:
         """Number of gains, k; u[k] is t."""
         return self.family.feedback.lower.size
 
+    @functools.cached_property
+    def units(self) -> FloatArray:
+        """Units of u in which gains within narrow bounds are of order one."""
+        width = self.family.feedback.upper - self.family.feedback.lower
+        units = np.ones(self.start.size)
+        units[: self.gains] = 2.0 ** np.floor(np.log2(np.minimum(width, 1.0)))
+        return units
+
     def places(self, u: FloatArray) -> ComplexArray:
         """Return t + iω of every root."""
         omega = np.zeros(len(self.roots))
@@ -121,7 +129,7 @@ def conditions(
     """Pose the conditions of a configuration that was suggested at given gains."""
     omega = np.array([root.omega for root in roots])
     s = abscissa + 1j * omega
-    ladder = family.near(s)[:, None] ** np.arange(_TERMS)
+    ladder = family.reach(s)[:, None] ** np.arange(_TERMS)
     sizes = np.abs(family.taylor(s, gains, _TERMS)[0] * ladder).max(axis=1)
     start = np.concatenate([gains, [abscissa], omega[omega != 0.0]])
     return Conditions(family, roots, tuple(ladder / sizes[:, None]), start)

@@ -10,7 +10,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgeev
 
 from drillctrl.base.arrays import ComplexArray, FloatArray
-from drillctrl.base.errors import InputError
+from drillctrl.base.errors import InputError, UndecidedError
 from drillctrl.delay.closing import close_loop, feedback_lags, loop_channels, with_terms
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.delay.system import DelaySystem
@@ -34,7 +34,7 @@ from drillctrl.synthesis.signals import Signals, signals_of
 
 # Gains that need more make the loop far faster than its plant; their loops are looked at again.
 _FINEST = 64
-_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)
 
 
 @dataclass(frozen=True)
@@ -206,10 +206,6 @@ class LoopFamily:
         """What its past and gains act on, where it has many states and few of these."""
         return signals_of(self.plain, self.drive, self.seen, self.lags)
 
-    def near(self, s: ComplexArray) -> FloatArray:
-        """Return radii around places on which `taylor` has its samples, (q,) → (q,)."""
-        return 0.1 * (1.0 + np.abs(s)) if self.signals is None else self.signals.near(s)
-
     @functools.cached_property
     def expansion(self) -> Expansion | None:
         """The determinant as a quasi-polynomial; None with several inputs or delays."""
@@ -242,7 +238,7 @@ class LoopFamily:
             slopes = each[:, 1:].transpose(0, 2, 1) @ self.spread
             return each[:, 0] + slopes @ gains, slopes
         # Samples on a circle: aliasing falls with the power points − terms.
-        radius = self.near(s)
+        radius = self.reach(s)
         ring = s[:, None] + radius[:, None] * _CIRCLE
         if self.signals is None:
             value, slope = self.determinant(ring.ravel(), gains)
@@ -253,6 +249,15 @@ class LoopFamily:
         scale = radius[:, None] ** -np.arange(terms)
         slopes = np.einsum("qpk,pl->qlk", slope.reshape(*ring.shape, gains.size), wave)
         return value.reshape(ring.shape) @ wave * scale, slopes * scale[..., None]
+
+    def reach(self, s: ComplexArray) -> FloatArray:
+        """Return radii around places on which `taylor` has its samples, (q,) → (q,).
+
+        On a wider circle, where exp(−sτ) turns far, det Δ would be taken for another function.
+        """
+        longest = max([*self.plain.delays, *self.lags.tolist()], default=0.0)
+        radius = np.minimum(0.1 * (1.0 + np.abs(s)), 4.0 / (longest or 1.0))
+        return radius if self.signals is None else np.minimum(radius, self.signals.near(s))
 
     def seen_at(self, s: ComplexArray) -> ComplexArray:
         """Return the rows cj(s), (q, c, n): a delayed output is seen through exp(−sτ)."""
@@ -265,8 +270,11 @@ class LoopFamily:
         return np.asarray(characteristic.matrix(self.plain, s) - fed_back)
 
     def exact(self, gains: FloatArray) -> float:
-        """Return the spectral abscissa of the delay system."""
-        return spectral_abscissa(self.loop(gains))
+        """Return the spectral abscissa of the delay system, infinite where it cannot be told."""
+        try:
+            return spectral_abscissa(self.loop(gains))
+        except UndecidedError:
+            return np.inf
 
     def eigenvalues(self, gains: FloatArray) -> ComplexArray:
         """Return the eigenvalues of the collocated generator, rightmost first."""

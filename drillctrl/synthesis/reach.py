@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError
 from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
 from drillctrl.synthesis.family import LoopFamily, loop_family
@@ -71,7 +70,8 @@ def searched_reach(
     found: list[Reach] = []
 
     def does(gains: FloatArray) -> bool:
-        found.append(Reach(_exact(family, gains) - line, gains))
+        # The collocation promises too much near multiple roots.
+        found.append(Reach(family.exact(gains) - line, gains))
         return found[-1].margin < 0.0
 
     def descends(start: FloatArray) -> bool:
@@ -95,14 +95,3 @@ def _everywhere(family: LoopFamily) -> Iterator[FloatArray]:
     for placed in (False, True):
         for one in families:
             yield from starting_points(one, 0, _EFFORT, placed=placed)
-
-
-def _exact(family: LoopFamily, gains: FloatArray) -> float:
-    """Return α, which the collocation promises too low near multiple roots.
-
-    It is infinite where roots cannot be told apart: such gains are not found to do anything.
-    """
-    try:
-        return family.exact(gains)
-    except InputError:
-        return np.inf

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drillctrl.base.arrays import FloatArray
+from drillctrl.base.errors import UndecidedError
 from drillctrl.spectrum.pseudospectral import own_abscissa
+from drillctrl.spectrum.roots import dominant_roots
 from drillctrl.synthesis.active import ActiveDesign, hypotheses, sharpen
 from drillctrl.synthesis.boxes import nested_boxes
 from drillctrl.synthesis.descent import bfgs
@@ -23,6 +25,8 @@ _WIDTHS = (0.05, 0.2, 0.5)
 _DESCENTS = 4
 # How often a collocation is drawn further left, and how far at most, over the longest delay.
 _DEEPER, _LEFTMOST = 6, -200.0
+# By so little other roots may lie right of those that were made to coincide.
+_SHARP = 1e-7
 
 
 @dataclass(frozen=True)
@@ -300,8 +304,7 @@ def improve(family: LoopFamily, basin: Basin, rounds: int) -> tuple[Basin, int]:
                 sharp = sharpen(family, best.gains, best.value, roots)
                 value = exact(sharp.gains)
                 used += sharp.evaluations + 1
-                converged = sharp.residual < 1e-9 and value < sharp.abscissa + _blur(roots)
-                if converged and sharp.abscissa < best.value - 1e-12:
+                if _holds(family, sharp, value) and sharp.abscissa < best.value - 1e-12:
                     best = Basin(sharp.gains, sharp.abscissa, sharp.roots)
                     improved = True
                 elif value < best.value - 1e-9:
@@ -327,17 +330,28 @@ def follow(family: LoopFamily, start: FloatArray, roots: tuple[ActiveRoot, ...])
     lower, upper = family.feedback.lower, family.feedback.upper
     start = np.clip(start, lower, upper)
     sharp = sharpen(family, start, family.exact(start), roots)
-    if not _holds(family, sharp):
+    if not _holds(family, sharp, family.exact(sharp.gains)):
         return None
     return Basin(sharp.gains, sharp.abscissa, sharp.roots)
 
 
-def _holds(family: LoopFamily, sharp: ActiveDesign) -> bool:
-    """Whether the conditions are met and no other root lies further right."""
-    if not sharp.residual < 1e-9:
+def _holds(family: LoopFamily, sharp: ActiveDesign, value: float) -> bool:
+    """Whether the conditions are met and no root but the active ones lies further right.
+
+    Roots that coincide are thrown apart by rounding, and so may show further right themselves.
+    """
+    blur = _blur(sharp.roots)
+    if not (sharp.residual < 1e-9 and value < sharp.abscissa + blur):
         return False
-    value = family.exact(sharp.gains)
-    return value < sharp.abscissa + _blur(sharp.roots)
+    if value <= sharp.abscissa + _SHARP:
+        return True
+    places = sharp.abscissa + 1j * np.array([root.omega for root in sharp.roots])
+    try:
+        known = dominant_roots(family.loop(sharp.gains))
+    except UndecidedError:
+        return False
+    others = [root for root in known if np.abs(root.value - places).min() > blur]
+    return all(root.rightmost <= sharp.abscissa + _SHARP for root in others)
 
 
 def _blur(roots: tuple[ActiveRoot, ...]) -> float:

@@ -78,7 +78,7 @@ class Signals:
     def near(self, s: ComplexArray) -> FloatArray:
         """Return radii of circles around places on which det Δ is smooth, (q,)."""
         away = np.sort(np.abs(s[:, None] - self.poles), axis=1)
-        return np.asarray(np.minimum(0.1 * (1.0 + np.abs(s)), _NEAR * away[:, _THIRD]))
+        return np.asarray(_NEAR * away[:, _THIRD])
 
     def determinant(
         self, s: ComplexArray, centre: ComplexArray, entries: FloatArray

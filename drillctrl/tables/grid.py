@@ -63,6 +63,7 @@ FEEDS = ("penetration_rate", "weight_on_bit")
 THIRD = ("rock_strength", *CHANGES)
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class Axis:
     """Rising values of one quantity.

@@ -1,4 +1,5 @@
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,15 @@ def test_results_of_another_library_are_refused_and_left_alone(name, tmp_path, m
     monkeypatch.undo()
     with Checkpoint(path) as again:
         assert again.find("a") == {"b": 1}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks of this kind")
+def test_two_runs_are_not_at_one_checkpoint(tmp_path):
+    path = tmp_path / "table.checkpoint"
+    with Checkpoint(path) as first:
+        first.keep("a", {"b": 1})
+        with pytest.raises(InputError, match="no other run"):
+            Checkpoint(path)
+        first.keep("c", {"d": 2})
+    with Checkpoint(path) as again:
+        assert (again.find("a"), again.find("c")) == ({"b": 1}, {"d": 2})

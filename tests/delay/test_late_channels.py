@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.optimize
 from scipy.special import lambertw
 
 from drillctrl import (
@@ -20,6 +21,7 @@ from drillctrl import (
     lifted_system,
     loop_transfer,
     paper_plant,
+    pid_control,
     spectral_abscissa,
     with_filter,
     with_late_output,
@@ -28,7 +30,9 @@ from drillctrl.designs.loops import spectral_abscissas
 from drillctrl.robustness.margins import with_delay_factor
 from drillctrl.robustness.transfer import frequency_response
 from drillctrl.spectrum import characteristic
-from drillctrl.synthesis.family import loop_family
+from drillctrl.synthesis.active import ActiveDesign
+from drillctrl.synthesis.family import ActiveRoot, loop_family
+from drillctrl.synthesis.search import _holds
 
 S = np.array([0.3 + 0.7j, -0.4 + 2.0j, 1.1 - 3.0j])
 
@@ -218,10 +222,10 @@ def test_what_cannot_have_late_channels_says_so(many):
 
 @pytest.fixture(scope="module")
 def exchanger():
-    """A heated body, a cooler and two long pipes, with the sum of the error.
+    """A heater, a mixer, a cooler and long pipes, with the sum of the error.
 
-    Delays in the states up to 40 s and one of 13.2 s at the input; the other numbers are made up
-    in the manner of such set-ups.
+    The heat transfer set-up of Vyhlídal, Zítek and Paulů, with the constants that tdcpy states
+    for it (examples/example_closed_loop_static.py, "Heat Exchanger problem").
     """
     terms = {tau: np.zeros((5, 5)) for tau in (0.0, 2.8, 6.5, 9.2, 13.0, 18.0, 40.0)}
     terms[0.0][1:3, :3] = [[1.0 / 3.0, -2.0 / 3.0, 0.0], [0.0, 0.0, -1.0 / 3.0]]
@@ -256,6 +260,62 @@ def test_a_late_input_before_six_other_delays(exchanger):
     assert response[..., 0] == pytest.approx(expected, rel=1e-12)
     loop = loop_transfer(plant, structure, gains, None, np.array([0.05]))
     assert loop[0, 0, 0] == pytest.approx(-(gains @ expected)[0, 0], rel=1e-12)
+
+
+def test_roots_that_coincide_are_no_optimum_where_others_lie_right_of_them(exchanger):
+    """Six roots meet at −0.0737, which shows them to 0.005, and a pair lies at −0.048 ± 0.23i."""
+    plant, *_ = exchanger
+    family = loop_family(plant, feedback(1, 5, late=0.0))
+    gains = np.array([-0.19392818, 1.03765537, -3.4039846, -2.90944452, 0.09222856])
+    meant = ActiveDesign(gains, -0.0736985, (ActiveRoot(0.0, 6),), 0.0, 0)
+    value = family.exact(gains)
+    assert value == pytest.approx(-0.048016, abs=1e-6)
+    assert not _holds(family, meant, value)
+
+
+@pytest.mark.long
+def test_a_pi_controller_behind_a_late_input_before_six_other_delays(exchanger):
+    """The temperature behind the cooler, held without the sum of the error among the states."""
+    _, terms, drive = exchanger
+    alone = DelaySystem(
+        terms[0.0][:4, :4],
+        tuple(matrix[:4, :4] for tau, matrix in terms.items() if tau),
+        tuple(tau for tau in terms if tau),
+        drive[:4],
+        np.eye(4)[3:],
+        input_delays=(13.2,),
+    )
+    controlled, structure = pid_control(alone, "u1", "y1", proportional=5.0, integral=0.1)
+    found = design(controlled, structure, trials=False)
+    kp, ki = found.K1[0]
+
+    def parts(s):
+        """Return det Δ(s) and det Δ(s) G(s) of the plant."""
+        delta = s * np.eye(4) - sum(matrix[:4, :4] * np.exp(-s * t) for t, matrix in terms.items())
+        size = np.linalg.det(delta)
+        return size, size * np.linalg.solve(delta, drive[:4])[3, 0] * np.exp(-13.2 * s)
+
+    def by_hand(s):
+        size, response = parts(s)
+        return s * size - (kp * s + ki) * response
+
+    # No roots lie right of those that are given: from 0 to far up the phase of a polynomial of
+    # degree 5 turns by 5 quarters.
+    line = found.spectral_abscissa + 1e-5
+    omega = np.concatenate([[0.0], np.geomspace(1e-7, 0.01, 500), np.linspace(0.01, 60.0, 3000)])
+    turned = np.unwrap(np.angle([by_hand(line + 1j * w) for w in omega]))
+    assert (turned[-1] - turned[0]) / (0.5 * np.pi) == pytest.approx(5.0, abs=0.05)
+
+    # Three roots meet where s/G(s) = kp s + ki has no curvature.
+    def expanded(s):
+        ring = 2e-3 * np.exp(2j * np.pi * np.arange(32) / 32)
+        values = [(s + z) * np.divide(*parts(s + z)) for z in ring]
+        return [float(np.mean(values * ring**-k).real) for k in range(3)]
+
+    best = scipy.optimize.brentq(lambda s: expanded(s)[2], -0.03, -0.02)
+    value, slope, _ = expanded(best)
+    assert found.spectral_abscissa == pytest.approx(best, abs=1e-8)
+    assert found.K1[0] == pytest.approx([slope, value - slope * best], abs=1e-8)
 
 
 @pytest.mark.long

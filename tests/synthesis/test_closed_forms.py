@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from drillctrl import DelaySystem, FeedbackStructure, design, spectral_abscissa
+from drillctrl import DelaySystem, FeedbackStructure, design, pid_control, spectral_abscissa
 
 
 def within(outputs, K1, K2, inputs=("u",)):
@@ -98,6 +98,8 @@ CASES = {
     # Far left of the axis, over 1/τ.
     "stable": lag(-1.0, 2.0),
     "fast": lag(-20.0, 0.5),
+    # So far that the best gain is 7e-23.
+    "faster": lag(-50.0, 1.0),
     "pi": integrator_pi(0.3, 1.0),
     "twice": position_twice(0.0, 4.0, 0.5),
     "damped": position_twice(0.2, 1.0, 1.0),
@@ -129,6 +131,21 @@ def test_in_wider_bounds_too(name):
 @pytest.mark.parametrize("name", CASES)
 def test_in_bounds_of_any_width(name, wide):
     reached(name, wide)
+
+
+def test_where_the_best_zero_cancels_the_pole_the_answer_says_how_sure_it_is():
+    """(s + 1)(s e^s − k): the pole of 1/(s + 1) and a double root at −1, at k = −1/e.
+
+    Of three roots in one place rounding of the gains moves each by its cube root.
+    """
+    plant = DelaySystem([[-1.0]], B=[[1.0]], C=[[1.0]], input_delays=(1.0,))
+    controlled, structure = pid_control(plant, "u1", "y1", proportional=2.0, integral=2.0)
+    found = design(controlled, structure, trials=False)
+    assert found.K1[0] == pytest.approx(-math.exp(-1.0), abs=1e-8)
+    assert found.loop.abscissa_error < 1e-4
+    assert found.spectral_abscissa == pytest.approx(-1.0, abs=found.loop.abscissa_error)
+    assert found.loop.dominant_roots[0].multiplicity == 3
+    assert found.loop.dominant_roots[0].real == pytest.approx(-1.0, abs=1e-8)
 
 
 @pytest.mark.parametrize("change", [0.0, 1e-12, 1e-9, -1e-7, 3e-6, 1e-5, -1e-4])
