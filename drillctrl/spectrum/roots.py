@@ -144,6 +144,8 @@ def _collocated(system: DelaySystem, depth: float, line: float | None) -> _Gathe
             start = inside[inside.real >= floor - left]
             s, done = polish(system, start)
             moved = np.abs(s - start)
+            # What ran away to no number has moved as far as can be.
+            moved[np.isnan(moved)] = np.inf
             wider = left
             if (moved > _NARROW * (1.0 + np.abs(start))).any():
                 # A simple root starts far nearer than that: it has neighbours that pull.

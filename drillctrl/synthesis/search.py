@@ -59,6 +59,7 @@ EFFORTS = {
     2: Effort(32, 5, 35, 2, 3),
     3: Effort(128, 10, 80, 5, 4),
     4: Effort(256, 18, 80, 6, 4),
+    5: Effort(256, 18, 240, 6, 4),
 }
 # Of a plant of many states few descents are begun that go on for long.
 _MANY_STATES = {
@@ -66,6 +67,7 @@ _MANY_STATES = {
     2: Effort(16, 4, 35, 2, 3),
     3: Effort(24, 6, 160, 3, 4),
     4: Effort(24, 8, 200, 3, 4),
+    5: Effort(24, 8, 240, 3, 4),
 }
 
 
@@ -138,7 +140,8 @@ def global_search(
         only = Basin(family.feedback.lower, value, ())
         return Search(only, (only,), 1, 1)
     if effort is None:
-        effort = EFFORTS[min(count, 4)] if family.signals is None else _MANY_STATES[min(count, 4)]
+        efforts = EFFORTS if family.signals is None else _MANY_STATES
+        effort = efforts[min(count, max(efforts))]
     family = _near_what_is(family)
     search = _in_boxes(family, seed, effort, known)
     for _ in range(_DEEPER):

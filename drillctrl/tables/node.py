@@ -152,8 +152,7 @@ def _searched(family: LoopFamily, task: NodeTask) -> Search:
     lower, upper = task.structure.lower, task.structure.upper
     margin = _INSIDE * (upper - lower)
     known = [np.clip(gains, lower + margin, upper - margin) for gains in task.known]
-    count = min(lower.size, 4)
-    effort = _CONTINUED.get(count) if known else EFFORTS.get(count)
+    effort = _CONTINUED.get(min(lower.size, 4)) if known else EFFORTS.get(min(lower.size, 5))
     return global_search(family, task.seed, effort, known)
 
 

@@ -65,6 +65,14 @@ def test_a_cluster_keeps_its_members_where_a_circle_about_it_is_disturbed():
     assert spectral_abscissa(system) == pytest.approx(3.23722816108e-07, rel=1e-9)
 
 
+def test_roots_that_all_run_away_are_sought_otherwise():
+    # A nilpotent matrix, and delayed ones of zeros: a double root at 0.
+    system = agreement.random_system(73001301)
+    assert agreement.verdict(system, 1.0)[0] == "agrees"
+    assert spectral_abscissa(system) == pytest.approx(0.0, abs=1e-9)
+    assert dominant_roots(system)[0].multiplicity == 2
+
+
 def test_a_wrong_root_would_be_told(monkeypatch):
     system = DelaySystem([[-1.0]], ([[0.5]],), (1.0,))
     assert agreement.verdict(system, 1.0) == ("agrees", "")
