@@ -9,6 +9,7 @@ once for all of them.
 
 from __future__ import annotations
 
+import atexit
 import functools
 import hashlib
 import importlib.util
@@ -52,8 +53,15 @@ def cache_folder() -> Path:
             return wanted
     except OSError:
         pass
-    # A private folder: code is run from it, so nobody else may have put it there.
-    return Path(tempfile.mkdtemp(prefix="drillctrl-"))
+    return _private_folder()
+
+
+@functools.cache
+def _private_folder() -> Path:
+    """Return a folder that goes with the process: code is run from it, so no one else may write."""
+    folder = tempfile.TemporaryDirectory(prefix="drillctrl-", ignore_cleanup_errors=True)
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
 
 
 def kernel_sources() -> dict[str, str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.errors import InputError, checked_number
+from drillctrl.base.kinds import makes_of_kinds
 from drillctrl.drilling.point import OperatingPoint
 from drillctrl.simulation.past import Past
 
@@ -18,6 +19,7 @@ STARTS = ("steady", "rest", "stick")
 STOOD = 1.0
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class Change:
     """A step or ramp of what is imposed on the bit.
@@ -56,6 +58,7 @@ class Change:
                 object.__setattr__(self, name, checked_number(name, value, 0.0, 1e9))
 
 
+@makes_of_kinds
 @dataclass(frozen=True)
 class Scenario:
     """How the motion starts, and what changes.
@@ -98,6 +101,9 @@ class Scenario:
         for name, value in self.initial.items():
             checked_number(f"initial {name}", value, -1e6, 1e6)
         changes = tuple(self.changes)
+        for change in changes:
+            if not isinstance(change, Change):
+                raise InputError("changes", change, "each a Change")
         object.__setattr__(self, "changes", changes)
         for before, after in itertools.pairwise(changes):
             if after.time < before.time + before.duration:

@@ -69,6 +69,7 @@ def stiff_control(machine: DriveMachine, pipe: float) -> DriveControl:
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
     """
+    pipe = checked_number("pipe", pipe, 1e-6, 1e9)
     return pi_control(machine, 50.0 * pipe, 5.0 * machine.inertia, name="stiff")
 
 
@@ -100,6 +101,7 @@ def soft_torque_control(
     """
     omega = 2.0 * math.pi * checked_number("frequency", frequency, 0.0, 100.0, open_low=True)
     integral = omega**2 * (machine.inertia - compensated)
+    pipe = checked_number("pipe", pipe, 1e-6, 1e9)
     return pi_control(machine, times * pipe, integral, compensated, name)
 
 
@@ -114,6 +116,8 @@ def fastest_control(machine: DriveMachine, stiffness: float, inertia: float) -> 
     stiffness, inertia : float
         Of the string as one torsional degree of freedom, N m/rad and kg m².
     """
+    stiffness = checked_number("stiffness", stiffness, 1e-6, 1e9)
+    inertia = checked_number("inertia", inertia, 1e-6, 1e9)
     proportional = 2.0 * math.sqrt(machine.inertia * stiffness)
     integral = machine.inertia * stiffness / inertia
     return pi_control(machine, proportional, integral, name="soft-torque-fastest")
@@ -140,6 +144,7 @@ def z_torque_control(
     high_pass : float
         Hz, corner of the high-pass filter; 0 for none.
     """
+    pipe = checked_number("pipe", pipe, 1e-6, 1e9)
     wanted = pipe * checked_number("times", times, 0.0, 1e3, open_low=True)
     corner = 2.0 * math.pi * checked_number("high_pass", high_pass, 0.0, 10.0)
     speed = 2.0 * math.pi * _INNER_FREQUENCY

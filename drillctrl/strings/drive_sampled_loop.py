@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 
 from drillctrl.base.arrays import FloatArray
-from drillctrl.base.errors import InputError, checked_integer
+from drillctrl.base.errors import InputError, checked_integer, checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.drilling.rig import Rig
 from drillctrl.strings.changed import changed_rig, string_of
@@ -46,6 +46,7 @@ def sampled_radius(law: SampledDrive, pipe: float) -> float:
     pipe : float
         ζ of the uppermost pipe, N m s/rad.
     """
+    pipe = checked_number("pipe", pipe, 0.0, 1e9)
     motion = np.array([[-pipe]]) / law.machine.inertia, np.array([1.0]) / law.machine.inertia
     return max(_radius(law, node, motion) for node in law.nodes)
 
