@@ -13,7 +13,7 @@ import numpy.typing as npt
 from drillctrl.base.errors import checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
-from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
+from drillctrl.charts.plane import AxisLike, Plane, area_text, axis_range, make_plane, plane_fields
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position
@@ -104,7 +104,7 @@ class StabilityChart:
         lines = [
             f"{what} is stable on {share:.1%} of this chart: {name}",
             *(
-                f"  {word:<9} {axis.label} in [{axis.low:g}, {axis.high:g}]"
+                f"  {word:<9} {axis_range(plane, axis)}"
                 for word, axis in (("over", plane.x), ("and", plane.y))
             ),
             f"  stable    {area_text(self.stable_area, self.area_error, plane)}",

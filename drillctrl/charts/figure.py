@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -11,12 +12,13 @@ from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, headline, new_
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
-from drillctrl.charts.plane import held_text
+from drillctrl.charts.plane import held_text, told_axis
 from drillctrl.drilling.gain_units import control_text
 from drillctrl.drilling.quantities import root_scales, told_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
 
     from drillctrl.base.arrays import FloatArray
     from drillctrl.charts.plane import Plane
@@ -34,6 +36,11 @@ def label_axes(ax: Axes, plane: Plane) -> None:
     ax.set_ylim(plane.y.low, plane.y.high)
     ax.set_xlabel(axis_text(plane.x))
     ax.set_ylabel(axis_text(plane.y))
+    for axis, side in ((plane.x, ax.xaxis), (plane.y, ax.yaxis)):
+        factor, unit = told_axis(plane, axis)
+        if unit != axis.unit:
+            side.set_label_text(axis_text(replace(axis, unit=unit)))
+            _tell_in(side, factor)
     if (told := plane.case.told_point) is None:
         return
     rig, language = told.rig, told.language
@@ -56,6 +63,18 @@ def label_axes(ax: Axes, plane: Plane) -> None:
         ax.secondary_yaxis("right", functions=_scaling(factor)).set_ylabel(text)
 
 
+def _tell_in(side: XAxis | YAxis, factor: float) -> None:
+    """Number an axis by ``factor`` times what is drawn, at round numbers."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    class Scaled(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> list[float]:
+            return [value / factor for value in super().tick_values(vmin * factor, vmax * factor)]
+
+    side.set_major_locator(Scaled(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
+    side.set_major_formatter(FuncFormatter(lambda value, _: f"{value * factor:.6g}"))
+
+
 def _scaling(factor: float) -> tuple[Scale, Scale]:
     return (lambda value: np.asarray(value) * factor, lambda value: np.asarray(value) / factor)
 
@@ -74,7 +93,8 @@ def axis_text(axis: Axis) -> str:
     if axis.name[:1] == "K" and axis.name[1:2].isdigit():
         head, *indices = axis.name.split("_")
         delayed = " on the delayed output" if head == "K2" else ""
-        return axis_name(f"gain ${head[0]}_{{{','.join([head[1:], *indices])}}}${delayed}")
+        name = f"gain ${head[0]}_{{{','.join([head[1:], *indices])}}}${delayed}"
+        return axis_name(name, axis.unit)
     if axis.name in RIG_AXES:
         return axis_name(RIG_AXES[axis.name][2], axis.unit)
     return axis_name(words.get(axis.name, axis.label), axis.unit)

@@ -30,6 +30,7 @@ from drillctrl.delay.system import DelaySystem
 from drillctrl.designs.loops import gains_along, loop_arrays
 from drillctrl.drilling.case import Case, Where, as_case
 from drillctrl.drilling.coefficients import GROUP_NAMES
+from drillctrl.drilling.gain_units import told_gain
 from drillctrl.drilling.point import OperatingPoint, RigPoint
 from drillctrl.drilling.rig import Rig
 from drillctrl.drilling.steady import rig_point_at_weight_on_bit, steady_state
@@ -416,8 +417,27 @@ def plane_fields(plane: Plane) -> dict[str, Any]:
     }
 
 
+def told_axis(plane: Plane, axis: Axis) -> tuple[float, str]:
+    """Return what one of an axis is told as, and the unit: gains of a rig have one of its own."""
+    structure, plant, told = plane.structure, plane.case.plant, plane.case.told_point
+    if structure is None or plant is None or told is None or axis.name not in structure.gain_names:
+        return 1.0, axis.unit
+    most = max(abs(axis.low), abs(axis.high))
+    return told_gain(structure, axis.name, plant, told.rig, told.language, most)
+
+
+def axis_range(plane: Plane, axis: Axis) -> str:
+    """Say what an axis goes over."""
+    factor, unit = told_axis(plane, axis)
+    ends = f"[{factor * axis.low:.6g}, {factor * axis.high:.6g}]"
+    return f"{axis.label} in {ends}" + (f" {unit}" if unit != axis.unit else "")
+
+
 def area_text(area: float, error: float, plane: Plane) -> str:
     """Return an area with its error and its share of the chart."""
-    digits = max(0, min(6, -math.floor(math.log10(max(error, 1e-12)))))
     share = area / (plane.x.span * plane.y.span)
+    for axis in (plane.x, plane.y):
+        factor, _ = told_axis(plane, axis)
+        area, error = area * factor, error * factor
+    digits = max(0, min(6, -math.floor(math.log10(max(error, 1e-12)))))
     return f"{area:.{digits}f} ± {error:.1g} ({share:.1%} of the chart)"

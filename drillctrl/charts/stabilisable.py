@@ -16,7 +16,7 @@ from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.chart import chart
 from drillctrl.charts.decisions import Place, Searched, by_curves, has_curves
-from drillctrl.charts.plane import AxisLike, Plane, area_text, make_plane, plane_fields
+from drillctrl.charts.plane import AxisLike, Plane, area_text, axis_range, make_plane, plane_fields
 from drillctrl.charts.scan import ScanLine, Scanner
 from drillctrl.charts.scanners import first_position
 from drillctrl.charts.searched_scan import SEARCHED_TOLERANCE, SearchedScan
@@ -150,8 +150,7 @@ class StabilisableChart:
         alone = self.open_loop
         lines = [
             f"Where some gains of {structure.name} {goal}",
-            f"  over      {plane.x.label} in [{plane.x.low:g}, {plane.x.high:g}], "
-            f"{plane.y.label} in [{plane.y.low:g}, {plane.y.high:g}]",
+            f"  over      {axis_range(plane, plane.x)}, {axis_range(plane, plane.y)}",
             f"  bounds    {bounds}",
             f"  reached   {area_text(self.stable_area, self.area_error, plane)}",
             f"  open loop {area_text(alone.stable_area, alone.area_error, plane)}",

@@ -11,6 +11,9 @@ from drillctrl.drilling.plant import Plant
 from drillctrl.drilling.quantities import quotient_unit, si_scale
 from drillctrl.drilling.rig import Rig
 
+# Units that take a k before them.
+_WITH_K = ("N", "ft", "lbf")
+
 
 def gain_units(
     structure: FeedbackStructure, plant: Plant, rig: Rig
@@ -46,6 +49,20 @@ def rig_gain_units(
     return [(factor, name.replace("·", "*")) for factor, name in flat] * 2
 
 
+def told_gain(
+    structure: FeedbackStructure, name: str, plant: Plant, rig: Rig, language: Language, most: float
+) -> tuple[float, str]:
+    """Return what one of a gain is told as, and the unit, for numbers up to ``most``."""
+    units = rig_gain_units(structure, plant, rig)
+    assert units is not None
+    factor, unit = units[structure.entry_names.index(name)]
+    unit, per = language.gain(unit.replace("*", "·"))
+    factor *= per
+    if unit.startswith(_WITH_K) and most * factor >= 1e3:
+        return factor / 1e3, f"k{unit}"
+    return factor, "" if unit == "1" else unit
+
+
 def gain_texts(
     structure: FeedbackStructure,
     gains: FloatArray,
@@ -67,7 +84,7 @@ def gain_texts(
 def _with_unit(value: float, unit: str, factor: float) -> str:
     """Return a number in few digits, a large one with a k before the unit."""
     value *= factor
-    if unit.startswith(("N", "ft", "lbf")) and abs(value) >= 1e3:
+    if unit.startswith(_WITH_K) and abs(value) >= 1e3:
         return f"{value / 1e3:.3g} k{unit}"
     if unit == "1":
         return f"{value:.3g}"

@@ -1,5 +1,8 @@
 """Charts against spectra computed by the pseudospectral route on fine samples."""
 
+import math
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -294,3 +297,23 @@ def test_weight_on_bit_is_an_axis():
         chart(rig_point, ("speed", 60.0, 300.0), ("wob", 5.0, 60.0))
     with pytest.raises(InputError, match="another parameter than x = rop"):
         chart(rig_point, ("rop", 1.0, 30.0), ("wob", 20.0, 60.0))
+
+
+def test_gains_of_a_rig_are_told_in_its_units():
+    rig = table1()
+    where = RigPoint(rig, 150.0 * math.pi / 30.0, 20.0 / 3600.0)
+    drawn = chart(where, ("K1_1", -5.0, 5.0), ("K2_1", -2.0, 2.0), "case1", tolerance=1e-2)
+    unit = rig.torsional_stiffness / 1e3
+    lines = drawn.summary().splitlines()
+    assert lines[1].split(maxsplit=1)[1] == f"K₁,₁ in [{-5 * unit:.6g}, {5 * unit:.6g}] kN·m/rad"
+    assert float(lines[3].split()[1]) == pytest.approx(drawn.stable_area * unit**2, rel=1e-3)
+    # Limits stay those of the gains; what stands at the ticks is in kN·m/rad.
+    ax = drawn.plot()
+    assert ax.get_xlim() == (-5.0, 5.0)
+    assert "kN·m/rad" in ax.get_xlabel()
+    ax.figure.canvas.draw()
+    ticks = [t for t in ax.xaxis.get_major_ticks() if -5.0 <= t.get_loc() <= 5.0]
+    told = [float(t.label1.get_text().replace("\N{MINUS SIGN}", "-")) for t in ticks]
+    assert told == pytest.approx([unit * t.get_loc() for t in ticks])
+    assert told == pytest.approx(np.round(told, 1))
+    plt.close(ax.figure)
