@@ -219,7 +219,8 @@ def _multiple_root(
     # How far rounding throws numbers apart that are told by their power sums.
     thrown = reach * max(abs(count - size), _LEAST_NOISE) ** (1.0 / size)
     rounding = change <= ROUNDING_TOLERANCE and apart < 8.0 * thrown
-    sharp = thrown < _SHARP * apart
+    # The circle tells members by its own errors, or that they are nearer together than it seems.
+    sharp = thrown < _SHARP * apart or apart + 4.0 * thrown < spread
     if not sharp and abs(refined - members.mean()) > spread:
         # Neither knows how far apart they are.
         rounding = True

@@ -122,7 +122,8 @@ def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     alone = arrays.A @ state + arrays.B @ [0.1, 0.2]
     load = model.bit_load(
         alone[1], alone[3], depth, (z_rate, turn), contact, getattr(data, torsion),
-        getattr(data, axial), 0, settings.real, settings.law, np.zeros(data.P_ROOM),
+        getattr(data, axial), 0, (0.0, 0.0, 0.0), settings.real, settings.law,
+        np.zeros(data.P_ROOM),
     )  # fmt: skip
     found = alone + arrays.E @ (np.array(load) - arrays.steady)
     np.testing.assert_allclose(found, expected, rtol=1e-12)

@@ -79,7 +79,7 @@ def test_taylor_of_many_states_beside_their_matrices(family):
     gains = np.array([0.5, -0.2, 0.4, 0.3])
     places = np.array([-0.2 + 3.1j, 0.1 + 0.4j, -0.5 + 0.0j])
     taylor, slopes = family.taylor(places, gains, 6)
-    step = 0.02 * family.near(places)
+    step = 0.02 * family.reach(places)
     poles = np.linalg.eigvals(family.plain.A0)
 
     def determinant(s, at):
