@@ -87,6 +87,9 @@ def loop_frd(
 
 
 def _is_smooth(response: ComplexArray) -> bool:
-    """Whether a curve is drawn through the points: of one channel, with no pole among them."""
-    one = response.shape[:2] == (1, 1) and response.shape[2] > 1
+    """Whether a curve is drawn through the points: of one channel, with no pole among them.
+
+    A cubic takes four.
+    """
+    one = response.shape[:2] == (1, 1) and response.shape[2] > 3
     return bool(one and np.isfinite(response).all())
