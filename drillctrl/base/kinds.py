@@ -138,6 +138,9 @@ def _wish(kind: Any, value: object) -> str | None:
         wishes = [_wish(part, value) for part in typing.get_args(kind)]
         return None if None in wishes else " or ".join(dict.fromkeys(map(str, wishes)))
     base = typing.get_origin(kind) or kind
+    while hasattr(base, "__value__"):
+        # An alias by a type statement, as of numpy 2.5's arrays.
+        base = typing.get_origin(base.__value__) or base.__value__
     if base in (float, int, complex):
         return None if _is_number(base, value) else _NUMBERS[base]
     if base is bool:
