@@ -75,7 +75,7 @@ def plot_sections(rig: StringRig, ax: Axes, language: Language = SI) -> Axes:
     turned = "speed imposed" if rig.drive is None else "top drive"
     ax.plot([-bit, bit], [0.0, 0.0], color="black", lw=3, clip_on=False)
     ax.annotate(turned, (bit, 0.0), (4, -1), textcoords="offset points", va="top", fontsize=8)
-    ax.set_xlim(-1.1 * bit, 3.0 * bit)
+    ax.set_xlim(-1.1 * bit, 4.2 * bit)
     ax.set_ylim(1.04 * top, -0.02 * top)
     ax.set_xlabel(axis_name("radius", language.unit("length")))
     ax.set_title("string", fontsize=10)
@@ -93,7 +93,7 @@ def plot_modes(modes: tuple[Mode, ...], ax: Axes, language: Language = SI) -> Ax
     ax.axvline(0.0, color=GREY, lw=0.6)
     ax.set_xlabel("shape, dimensionless")
     ax.set_title(f"{modes[0].kind} modes", fontsize=10)
-    ax.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+    ax.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.19))
     return ax
 
 
