@@ -93,6 +93,7 @@ def make_axis(
         name, low, high = given
     except (TypeError, ValueError):
         raise InputError("axis", repr(given), "a name and two limits") from None
+    typed = low, high
     gains = structure.gain_names if structure is not None else ()
     rigs = tuple(RIG_AXES) if case.rig_point is not None else ()
     if isinstance(case.rig, StringRig):
@@ -127,12 +128,25 @@ def make_axis(
             # The wear flat carries this much before anything is cut.
             idle = steady_state(replace(case.rig_point, penetration_rate=0.0)).weight_on_bit
             floor = idle / to_si_factor(name, language)
-    of = f", {unit}" if unit else ""
-    low = checked_number(f"{name} (lower limit{of})", low, floor, ceiling)
-    high = checked_number(f"{name} (upper limit{of})", high, floor, ceiling)
+    low = _limit(f"{name} (lower limit", typed[0], low, (floor, ceiling), unit)
+    high = _limit(f"{name} (upper limit", typed[1], high, (floor, ceiling), unit)
     if not low < high:
         raise InputError(f"limits of {name}", f"{low:g}:{high:g}", "lower:upper with lower < upper")
     return Axis(name, low, high, unit, label)
+
+
+def _limit(
+    name: str, typed: object, value: object, allowed: tuple[float, float], unit: str
+) -> float:
+    """Check a limit; what was typed with a unit of its own is refused in that."""
+    floor, ceiling = allowed
+    if isinstance(typed, str) and isinstance(value, float) and not floor <= value <= ceiling:
+        number, _, own = typed.strip().partition(" ")
+        if value and own:
+            per = float(number) / value
+            wanted = f"in [{floor * per:.5g}, {ceiling * per:.5g}] {own.strip()}"
+            raise InputError(f"{name})", typed, wanted)
+    return checked_number(f"{name}, {unit})" if unit else f"{name})", value, floor, ceiling)
 
 
 def _in_unit(name: str, value: object, dimension: Dimension, factor: float) -> object:

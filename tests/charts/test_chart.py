@@ -317,3 +317,12 @@ def test_gains_of_a_rig_are_told_in_its_units():
     assert told == pytest.approx([unit * t.get_loc() for t in ticks])
     assert told == pytest.approx(np.round(told, 1))
     plt.close(ax.figure)
+
+
+def test_a_limit_is_refused_in_the_unit_it_was_typed_in():
+    where = RigPoint(table1(), 100.0 * math.pi / 30.0, 20.0 / 3600.0)
+    speeds = ("speed", "50 rpm", "100 rpm")
+    with pytest.raises(InputError, match=r"wob \(lower limit\) = 1 klbf: must be in \[1\.7481, "):
+        chart(where, ("wob", "1 klbf", "90 klbf"), speeds)
+    with pytest.raises(InputError, match=r"wob \(lower limit, kN\) = 1.0: .*\[7\.776, 1e\+06\]"):
+        chart(where, ("wob", 1.0, 90.0), speeds)
