@@ -142,7 +142,7 @@ def _limit(
     floor, ceiling = allowed
     if isinstance(typed, str) and isinstance(value, float) and not floor <= value <= ceiling:
         number, _, own = typed.strip().partition(" ")
-        if value and own:
+        if value and own and float(number) != value:
             per = float(number) / value
             wanted = f"in [{floor * per:.5g}, {ceiling * per:.5g}] {own.strip()}"
             raise InputError(f"{name})", typed, wanted)
