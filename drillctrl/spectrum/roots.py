@@ -198,6 +198,8 @@ def _counted(system: DelaySystem, depth: float, line: float | None) -> _Gathered
         depth *= 0.25 if refused is None else 0.02
     if found is None:
         raise refused or climb.refuse(f"more than {MOST_ROOTS} roots lie right of {floor:.6g}")
+    if not found.size and line is None:
+        raise climb.refuse(f"none is found right of {floor:.6g}, near the rightmost")
     s, done = polish(system, found) if found.size <= _FEW else (found, np.ones(found.size, bool))
     if not done.all():
         raise climb.refuse(f"{int((~done).sum())} of {done.size} roots do not converge")

@@ -73,6 +73,13 @@ def test_roots_that_all_run_away_are_sought_otherwise():
     assert dominant_roots(system)[0].multiplicity == 2
 
 
+def test_no_roots_at_all_are_no_answer():
+    # Threefold chains to rounding: where none can be told apart that is said.
+    kind, told = agreement.verdict(agreement.random_system(75002480), 1.0)
+    assert kind == "refused"
+    assert "near the rightmost" in told
+
+
 def test_a_wrong_root_would_be_told(monkeypatch):
     system = DelaySystem([[-1.0]], ([[0.5]],), (1.0,))
     assert agreement.verdict(system, 1.0) == ("agrees", "")
