@@ -13,7 +13,8 @@ import numpy.typing as npt
 from drillctrl.base.errors import checked_number
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
-from drillctrl.charts.plane import AxisLike, Plane, area_text, axis_range, make_plane, plane_fields
+from drillctrl.charts.plane import AxisLike, Plane, make_plane, plane_fields
+from drillctrl.charts.plane_text import area_text, axis_range
 from drillctrl.charts.regions import Region, label_regions
 from drillctrl.charts.scan import ScanLine
 from drillctrl.charts.scanners import choose_scanner, first_position

@@ -12,7 +12,7 @@ from drillctrl.base.figure import BLUE, GREY, PALETTE, axis_name, headline, new_
 from drillctrl.base.kinds import checks_kinds
 from drillctrl.charts.axes import RIG_AXES, Axis
 from drillctrl.charts.chains import Curve, stable_strips
-from drillctrl.charts.plane import held_text, told_axis
+from drillctrl.charts.plane_text import held_text, told_axis
 from drillctrl.drilling.gain_units import control_text
 from drillctrl.drilling.quantities import root_scales, told_scale
 

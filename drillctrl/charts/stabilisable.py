@@ -16,7 +16,8 @@ from drillctrl.charts.axes import Axis
 from drillctrl.charts.chains import Curve, curve_fields, stable_curves
 from drillctrl.charts.chart import chart
 from drillctrl.charts.decisions import Place, Searched, by_curves, has_curves
-from drillctrl.charts.plane import AxisLike, Plane, area_text, axis_range, make_plane, plane_fields
+from drillctrl.charts.plane import AxisLike, Plane, make_plane, plane_fields
+from drillctrl.charts.plane_text import area_text, axis_range
 from drillctrl.charts.scan import ScanLine, Scanner
 from drillctrl.charts.scanners import first_position
 from drillctrl.charts.searched_scan import SEARCHED_TOLERANCE, SearchedScan

@@ -6,7 +6,7 @@ import math
 
 from drillctrl.base.text import set_out, wrapped
 from drillctrl.charts.axes import Axis
-from drillctrl.charts.plane import held_text
+from drillctrl.charts.plane_text import held_text
 from drillctrl.delay.structure import FeedbackStructure
 from drillctrl.drilling.gain_units import control_text
 from drillctrl.simulation.starts import start_named
