@@ -104,7 +104,7 @@ def test_unknown_operation_is_refused():
 @pytest.mark.parametrize("contact", [0, 1])
 def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     string = structure_of(CASE)
-    model = kernel("model")
+    contacts = kernel("contact")
     p = CASE.parameter_vector
     tau = 0.2
     z_rate = 3.0 if axial == "DOWN" else -3.0
@@ -120,7 +120,7 @@ def test_branches_are_the_plant_away_from_its_switches(torsion, axial, contact):
     )  # fmt: skip
     arrays = string.arrays
     alone = arrays.A @ state + arrays.B @ [0.1, 0.2]
-    load = model.bit_load(
+    load = contacts.bit_load(
         alone[1], alone[3], depth, (z_rate, turn), contact, getattr(data, torsion),
         getattr(data, axial), 0, (0.0, 0.0, 0.0), settings.real, settings.law,
         np.zeros(data.P_ROOM),
