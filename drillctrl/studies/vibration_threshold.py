@@ -12,6 +12,7 @@ import numpy as np
 
 from drillctrl.base.arrays import FloatArray
 from drillctrl.base.checkpoint import Checkpoint
+from drillctrl.base.text import finite_or_none
 from drillctrl.base.workers import Progress
 from drillctrl.charts.plane import Plane
 from drillctrl.delay.closing import close_loop
@@ -44,6 +45,8 @@ SWING = 0.03
 TORSION = "#7A0177"
 # Modes that are followed under a law of a drive, and steps of theirs and of Newton's method.
 _MODES, _STEPS, _NEWTON = 4, 13, 3
+# Last step of a root that has been followed, over its size.
+_ARRIVED = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +178,7 @@ def _under_laws(case: Case, laws: Sequence[DriveControl]) -> list[float | str | 
     if not math.isfinite(found.error):
         return [_unknown(found)] * len(laws)
     answer = found.value * rig.torsional_stiffness * time
-    return [time * law_growth(line, law, answer) for law in laws]
+    return [finite_or_none(time * law_growth(line, law, answer)) for law in laws]
 
 
 def law_growth(line: Line, law: DriveControl, answer: complex) -> float:
@@ -193,7 +196,7 @@ def law_growth(line: Line, law: DriveControl, answer: complex) -> float:
     Returns
     -------
     float
-        The largest of the first modes; NaN where none could be followed.
+        The largest of the first modes; NaN where one could not be followed, or there is none.
 
     Notes
     -----
@@ -209,7 +212,11 @@ def law_growth(line: Line, law: DriveControl, answer: complex) -> float:
             for _ in range(_NEWTON):
                 near = 1e-6 * abs(s)
                 here, there = (complex(bit_impedance(line, law, at)) for at in (s, s + near))
-                s -= (here - wanted) * near / (there - here)
+                step = (here - wanted) * near / (there - here)
+                s -= step
+        if not abs(step) < _ARRIVED * abs(s):
+            # It may be the one that grows.
+            return math.nan
         rates.append(float(s.real))
     known = max(rates)
     return known if math.isfinite(known) else math.nan
